@@ -1,0 +1,28 @@
+# The registry of operators is the folder ops/: material_assign.cpp defines `extern const OperatorInfo material_assign`.
+function(generate_registry result)
+  set(declarations "")
+  set(entries "")
+  foreach(source ${ARGN})
+    get_filename_component(symbol ${source} NAME_WE)
+    string(APPEND declarations "extern const OperatorInfo ${symbol};\n")
+    string(APPEND entries "    &${symbol},\n")
+  endforeach()
+  set(output ${CMAKE_BINARY_DIR}/generated/registry.cpp)
+  file(CONFIGURE OUTPUT ${output} @ONLY CONTENT
+"#include \"vdbdither/registry.h\"
+
+#include <iterator>
+
+namespace vdbdither {
+
+@declarations@
+std::span<const OperatorInfo* const> registeredOperators() {
+  static constexpr const OperatorInfo* entries[] = {
+@entries@      nullptr};
+  return {entries, std::size(entries) - 1};
+}
+
+}  // namespace vdbdither
+")
+  set(${result} ${output} PARENT_SCOPE)
+endfunction()

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <openvdb/math/Vec3.h>
+
+#include "vdbdither/mesh.h"
+
+namespace vdbdither::test {
+
+/// Closed, outward oriented meshes in mm, their vertices shared.
+Mesh boxMesh(const openvdb::Vec3d& min, const openvdb::Vec3d& max);
+
+/// A latitude-longitude sphere with `rings` bands of `2 * rings` quads; its vertices lie on the sphere.
+Mesh sphereMesh(const openvdb::Vec3d& centre, double radius, int rings);
+
+/// A torus around the z axis; `rings` segments around the axis, half as many around the tube.
+Mesh torusMesh(const openvdb::Vec3d& centre, double ring_radius, double tube_radius, int rings);
+
+/// `mesh` turned about the axes x, then y, then z (degrees), then moved.
+Mesh transformed(Mesh mesh, const openvdb::Vec3d& degrees, const openvdb::Vec3d& move);
+
+}  // namespace vdbdither::test

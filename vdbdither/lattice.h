@@ -1,0 +1,45 @@
+#pragma once
+
+#include <openvdb/math/Coord.h>
+#include <openvdb/math/Vec3.h>
+
+namespace vdbdither {
+
+/// Layers of voxels, half open: begin, begin + 1, …, end − 1 are absolute z indices of the lattice.
+struct ZRange {
+  int begin = 0;
+  int end = 0;
+
+  [[nodiscard]] int size() const { return end - begin; }
+  [[nodiscard]] bool empty() const { return end <= begin; }
+  [[nodiscard]] bool contains(int z) const { return z >= begin && z < end; }
+  friend bool operator==(const ZRange&, const ZRange&) = default;
+};
+
+/// Edge of an OpenVDB leaf; slabs are cut at multiples of it.
+inline constexpr int leaf_layers = 8;
+
+/// `range` grown outwards to multiples of `leaf_layers`.
+ZRange alignedToLeaves(ZRange range);
+
+/// The part that `a` and `b` share; empty ranges come back as {begin, begin}.
+ZRange intersection(ZRange a, ZRange b);
+
+/// The printer's lattice: index (i, j, k) is the centre of a voxel at origin_mm + (i·dx, j·dy, k·dz) mm.
+struct Lattice {
+  openvdb::Vec3d pitch_mm{1.0, 1.0, 1.0};
+  /// Where index (0, 0, 0) lies. Zero but on a lattice refined for interlacing.
+  openvdb::Vec3d origin_mm{0.0, 0.0, 0.0};
+  /// The voxels a job may touch, inclusive. Empty (min > max) where there are none.
+  openvdb::CoordBBox box;
+
+  [[nodiscard]] openvdb::Vec3d position(const openvdb::Coord& ijk) const {
+    return origin_mm + ijk.asVec3d() * pitch_mm;
+  }
+  [[nodiscard]] ZRange layers() const { return {box.min().z(), box.max().z() + 1}; }
+  /// Length of a voxel's diagonal, mm: the largest voxel diameter along any direction.
+  [[nodiscard]] double diagonalMm() const { return pitch_mm.length(); }
+  friend bool operator==(const Lattice&, const Lattice&) = default;
+};
+
+}  // namespace vdbdither

@@ -1,0 +1,21 @@
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+class SilentReporter : public Reporter {
+ public:
+  void warn(const std::string&) override {}
+  void count(const std::string&, double) override {}
+  void progress(double) override {}
+};
+
+}  // namespace
+
+Reporter& Operator::report() const {
+  static SilentReporter silent;
+  return reporter_ ? *reporter_ : silent;
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "vdbdither/options.h"
+#include "vdbdither/schema.h"
+
+namespace vdbdither {
+
+/// How many layers around its core a filter reads.
+struct Reach {
+  int below = 0;
+  int above = 0;
+  bool whole = false;  ///< a barrier: needs every layer at once
+
+  static Reach point() { return {}; }
+  static Reach stencil(int radius) { return {radius, radius, false}; }
+  static Reach everything() { return {0, 0, true}; }
+};
+
+/// A grid that a filter or a sink reads, and how far around the core.
+struct Read {
+  std::string grid;
+  Reach reach;
+};
+
+/// Words that an operator has for the user while it works. Safe to call from many threads.
+class Reporter {
+ public:
+  virtual ~Reporter() = default;
+  /// A line that the user should see whatever --quiet says.
+  virtual void warn(const std::string& text) = 0;
+  /// A figure for --json and --verbose: `repaired_edges`, 12.
+  virtual void count(const std::string& name, double value) = 0;
+  /// How far a long computation inside one call is, 0 … 1. Throws when the user wants to stop.
+  virtual void progress(double fraction) = 0;
+};
+
+/// One verb. `declare` binds the options; `plan` makes every check that can be made before the first voxel.
+class Operator {
+ public:
+  virtual ~Operator() = default;
+  virtual void declare(Options& options) = 0;
+  /// Bytes that the operator holds besides its slabs, known after `plan`.
+  [[nodiscard]] virtual double memoryBytes() const { return 0; }
+
+  void setReporter(Reporter* reporter) { reporter_ = reporter; }
+
+ protected:
+  [[nodiscard]] Reporter& report() const;
+
+ private:
+  Reporter* reporter_ = nullptr;
+};
+
+/// Makes any range of layers on demand.
+class Source : public Operator {
+ public:
+  virtual Schema plan() = 0;
+  /// The grids of the schema over `core`: a multiple of eight layers unless cut at the job's box. Const, in any
+  /// order, many at once.
+  [[nodiscard]] virtual Grids run(ZRange core) const = 0;
+};
+
+/// Maps slab to slab. Const, in any order, many at once.
+class Filter : public Operator {
+ public:
+  /// Checks `in` and returns what will come out. A grid left out of the result ends here.
+  virtual Schema plan(const Schema& in) = 0;
+  /// The grids it reads; `run` gets these and no others. Asked after `plan`.
+  [[nodiscard]] virtual std::vector<Read> reads() const = 0;
+  /// The grids it makes over in.core (what lies outside the core is cut off). Grids of the planned schema that
+  /// are not returned pass on unchanged.
+  [[nodiscard]] virtual Grids run(const Slab& in) const = 0;
+};
+
+/// Takes slabs in rising z. In the middle of a chain it sees the slabs and they pass on.
+class Sink : public Operator {
+ public:
+  virtual void plan(const Schema& in) = 0;
+  virtual void write(const Slab& in) = 0;
+  /// Publishes. Before it returns, nothing exists under the name that the user gave.
+  virtual void finish() = 0;
+};
+
+/// What the registry holds of an operator: `extern const OperatorInfo material_assign` in ops/material_assign.cpp.
+struct OperatorInfo {
+  std::string_view name;     ///< the verb, kebab-case
+  std::string_view summary;  ///< one sentence, no full stop
+  std::string_view example;  ///< a whole chain that runs in a folder with a `part.stl`
+  std::unique_ptr<Operator> (*make)();
+};
+
+}  // namespace vdbdither

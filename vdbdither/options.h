@@ -1,0 +1,63 @@
+#pragma once
+
+#include <functional>
+#include <limits>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <openvdb/math/Vec3.h>
+
+namespace vdbdither {
+
+/// One option, declared once: parsing, --help, the history line and the generated pages come from it.
+struct Option {
+  enum class Kind { flag, value, positional };
+
+  std::string name;      ///< kebab-case, without dashes
+  Kind kind = Kind::value;
+  std::string value;     ///< what stands for the value in help: MM, FILE, N, blue|white|none
+  std::string help;      ///< one sentence
+  std::string fallback;  ///< canonical text of the default
+  bool required = false;
+  std::function<void(const std::string&)> set;  ///< throws UsageError with what would have been accepted
+  std::function<std::string()> get;             ///< canonical text of the present value
+};
+
+/// The options of one operator, bound to its members.
+class Options {
+ public:
+  void flag(std::string name, bool& target, std::string help);
+  void text(std::string name, std::string& target, std::string value, std::string help);
+  void choice(std::string name, std::string& target, std::vector<std::string> choices, std::string help);
+  void integer(std::string name, int& target, int min, int max, std::string help);
+  void number(std::string name, double& target, double min, double max, std::string help);
+  /// A length in mm; accepts units as parseLengthMm does.
+  void length(std::string name, double& target_mm, std::string help);
+  /// Three numbers separated by commas, or one that stands for all three.
+  void triple(std::string name, openvdb::Vec3d& target, std::string value, std::string help);
+  void positional(std::string name, std::string& target, std::string help, bool required = true);
+
+  [[nodiscard]] std::span<const Option> all() const { return options_; }
+
+  /// Reads `arguments` into the targets. Throws UsageError; an unknown option names the nearest one.
+  void parse(std::span<const std::string> arguments) const;
+
+  /// The arguments that lead to the present values, in order of declaration, defaults left out, quoted for a shell.
+  [[nodiscard]] std::string canonical() const;
+
+ private:
+  std::vector<Option> options_;
+};
+
+/// Reads `0.042mm`, `42um`, `600dpi` (25.4/600), `1.5in`, `2cm`, or a plain number of mm. Throws UsageError.
+double parseLengthMm(std::string_view text);
+
+/// The shortest text that reads back as the same double.
+std::string shortestText(double value);
+
+/// The candidate nearest to `word` by edit distance, or an empty text where none is near.
+std::string nearestWord(std::string_view word, std::span<const std::string> candidates);
+
+}  // namespace vdbdither

@@ -1,0 +1,26 @@
+#include "vdbdither/registry.h"
+
+#include <string>
+#include <vector>
+
+#include "vdbdither/errors.h"
+
+namespace vdbdither {
+
+const OperatorInfo& findOperator(std::string_view name) {
+  std::vector<std::string> names;
+  for (const OperatorInfo* info : registeredOperators()) {
+    if (info->name == name) return *info;
+    names.emplace_back(info->name);
+  }
+  std::string message = "no operator '" + std::string(name) + "'";
+  if (const std::string near = nearestWord(name, names); !near.empty()) {
+    message += "; did you mean '" + near + "'?";
+  } else {
+    message += "; the operators are";
+    for (const std::string& known : names) message += " " + known;
+  }
+  throw UsageError(message);
+}
+
+}  // namespace vdbdither
