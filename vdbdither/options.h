@@ -16,11 +16,13 @@ struct Option {
   enum class Kind { flag, value, positional };
 
   std::string name;      ///< kebab-case, without dashes
+  char letter = 0;       ///< one-letter form, or 0
   Kind kind = Kind::value;
   std::string value;     ///< what stands for the value in help: MM, FILE, N, blue|white|none
   std::string help;      ///< one sentence
   std::string fallback;  ///< canonical text of the default
   bool required = false;
+  bool repeated = false;  ///< a positional that takes every remaining word
   std::function<void(const std::string&)> set;  ///< throws UsageError with what would have been accepted
   std::function<std::string()> get;             ///< canonical text of the present value
 };
@@ -38,16 +40,28 @@ class Options {
   /// Three numbers separated by commas, or one that stands for all three.
   void triple(std::string name, openvdb::Vec3d& target, std::string value, std::string help);
   void positional(std::string name, std::string& target, std::string help, bool required = true);
+  /// The one positional that takes several values.
+  void positionals(std::string name, std::vector<std::string>& targets, std::string help);
+  /// Gives the option declared last a one-letter form.
+  void letter(char letter) { options_.back().letter = letter; }
 
   [[nodiscard]] std::span<const Option> all() const { return options_; }
+  [[nodiscard]] const Option* find(std::string_view name) const;
 
-  /// Reads `arguments` into the targets. Throws UsageError; an unknown option names the nearest one.
-  void parse(std::span<const std::string> arguments) const;
+  /// Reads `arguments` into the targets of these options and of `common`, which yield to an option of the same name.
+  /// Throws UsageError; an unknown option names the nearest one.
+  void parse(std::span<const std::string> arguments, const Options& common = {}) const;
+
+  /// The text of --help: usage, the options with their defaults, the common ones in a group of their own.
+  [[nodiscard]] std::string help(const std::string& verb, const std::string& summary, const std::string& example,
+                                 const Options& common) const;
 
   /// The arguments that lead to the present values, in order of declaration, defaults left out, quoted for a shell.
   [[nodiscard]] std::string canonical() const;
 
  private:
+  Option& add(std::string name, Option::Kind kind, std::string value, std::string help);
+
   std::vector<Option> options_;
 };
 

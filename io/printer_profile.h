@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vdbdither/printer.h"
+
+namespace vdbdither {
+
+/// Reads the profile called `name_or_path`: a file when it ends in `.json`, else `printers/NAME.json` of the data
+/// folder. Throws UsageError when there is none (naming those there are), DataError when it is malformed.
+PrinterProfile readPrinterProfile(const std::string& name_or_path);
+
+/// The profile in one line of JSON, as grids carry it under `vdbdither:printer`; and back.
+std::string toJson(const PrinterProfile& profile);
+PrinterProfile printerProfileFromJson(const std::string& text);
+
+/// The names of the profiles in the data folder, sorted.
+std::vector<std::string> installedPrinters();
+
+}  // namespace vdbdither

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <openvdb/math/Vec3.h>
+
+namespace vdbdither {
+
+/// A material a printer can lay: what it is called and how it is shown.
+struct Material {
+  std::string name;
+  std::array<std::uint8_t, 4> rgba{};  ///< display colour, alpha 255 is opaque
+};
+
+/// What must be known of a printer before anything is voxelized for it.
+struct PrinterProfile {
+  std::string name;         ///< as written after --printer: mimaki-3duj-553
+  std::string title;        ///< as people call it
+  std::string source;       ///< where these figures were taken from
+  openvdb::Vec3d pitch_mm;  ///< voxel size across the carriage (x), along it (y), and the layer (z)
+  openvdb::Vec3d build_mm;  ///< usable volume; zero where unknown
+  std::vector<Material> materials;  ///< model materials first to last; support is the printer's own affair
+};
+
+}  // namespace vdbdither
