@@ -21,7 +21,8 @@ openvdb::Vec3d lengths(const ordered_json& values) {
   openvdb::Vec3d result;
   for (int axis = 0; axis < 3; ++axis) {
     const ordered_json& value = values.at(axis);
-    result[axis] = value.is_string() ? parseLengthMm(value.get<std::string>()) : value.get<double>();
+    result[axis] =
+        value.is_string() ? parseLengthMm(value.get<std::string>()) : value.get<double>();
   }
   return result;
 }
@@ -91,7 +92,8 @@ PrinterProfile printerProfileFromJson(const std::string& text) {
   try {
     return parse(text);
   } catch (const std::exception& error) {
-    throw DataError(std::string("the metadata vdbdither:printer is not a printer profile: ") + error.what());
+    throw DataError(std::string("the metadata vdbdither:printer is not a printer profile: ") +
+                    error.what());
   }
 }
 

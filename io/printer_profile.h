@@ -7,8 +7,9 @@
 
 namespace vdbdither {
 
-/// Reads the profile called `name_or_path`: a file when it ends in `.json`, else `printers/NAME.json` of the data
-/// folder. Throws UsageError when there is none (naming those there are), DataError when it is malformed.
+/// Reads the profile called `name_or_path`: a file when it ends in `.json`, else
+/// `printers/NAME.json` of the data folder. Throws UsageError when there is none (naming those
+/// there are), DataError when it is malformed.
 PrinterProfile readPrinterProfile(const std::string& name_or_path);
 
 /// The profile in one line of JSON, as grids carry it under `vdbdither:printer`; and back.

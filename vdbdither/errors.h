@@ -4,7 +4,8 @@
 
 namespace vdbdither {
 
-/// What a run can fail with. Messages say what, where and what to do, in one line and without a full stop.
+/// What a run can fail with. Messages say what, where and what to do, in one line and without a
+/// full stop.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

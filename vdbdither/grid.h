@@ -13,7 +13,8 @@ class GridBase;
 
 namespace vdbdither {
 
-/// How grids travel: shared and never changed. (OpenVDB's own alias would pull its heavy headers into ours.)
+/// How grids travel: shared and never changed. (OpenVDB's own alias would pull its heavy headers
+/// into ours.)
 using GridConstPtr = std::shared_ptr<const openvdb::GridBase>;
 
 }  // namespace vdbdither

@@ -25,7 +25,8 @@ ZRange alignedToLeaves(ZRange range);
 /// The part that `a` and `b` share; empty ranges come back as {begin, begin}.
 ZRange intersection(ZRange a, ZRange b);
 
-/// The printer's lattice: index (i, j, k) is the centre of a voxel at origin_mm + (i·dx, j·dy, k·dz) mm.
+/// The printer's lattice: index (i, j, k) is the centre of a voxel at origin_mm + (i·dx, j·dy,
+/// k·dz) mm.
 struct Lattice {
   openvdb::Vec3d pitch_mm{1.0, 1.0, 1.0};
   /// Where index (0, 0, 0) lies. Zero but on a lattice refined for interlacing.

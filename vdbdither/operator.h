@@ -40,7 +40,8 @@ class Reporter {
   virtual void progress(double fraction) = 0;
 };
 
-/// One verb. `declare` binds the options; `plan` makes every check that can be made before the first voxel.
+/// One verb. `declare` binds the options; `plan` makes every check that can be made before the
+/// first voxel.
 class Operator {
  public:
   virtual ~Operator() = default;
@@ -61,8 +62,8 @@ class Operator {
 class Source : public Operator {
  public:
   virtual Schema plan() = 0;
-  /// The grids of the schema over `core`: a multiple of eight layers unless cut at the job's box. Const, in any
-  /// order, many at once.
+  /// The grids of the schema over `core`: a multiple of eight layers unless cut at the job's box.
+  /// Const, in any order, many at once.
   [[nodiscard]] virtual Grids run(ZRange core) const = 0;
 };
 
@@ -73,8 +74,8 @@ class Filter : public Operator {
   virtual Schema plan(const Schema& in) = 0;
   /// The grids it reads; `run` gets these and no others. Asked after `plan`.
   [[nodiscard]] virtual std::vector<Read> reads() const = 0;
-  /// The grids it makes over in.core (what lies outside the core is cut off). Grids of the planned schema that
-  /// are not returned pass on unchanged.
+  /// The grids it makes over in.core (what lies outside the core is cut off). Grids of the planned
+  /// schema that are not returned pass on unchanged.
   [[nodiscard]] virtual Grids run(const Slab& in) const = 0;
 };
 
@@ -87,7 +88,8 @@ class Sink : public Operator {
   virtual void finish() = 0;
 };
 
-/// What the registry holds of an operator: `extern const OperatorInfo material_assign` in ops/material_assign.cpp.
+/// What the registry holds of an operator: `extern const OperatorInfo material_assign` in
+/// ops/material_assign.cpp.
 struct OperatorInfo {
   std::string_view name;     ///< the verb, kebab-case
   std::string_view summary;  ///< one sentence, no full stop

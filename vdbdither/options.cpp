@@ -33,7 +33,9 @@ std::string joined(std::span<const std::string> words, const char* separator) {
 }
 
 std::string quotedForShell(const std::string& word) {
-  const auto plain = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || std::strchr("_-+=./,:@%", c); };
+  const auto plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || std::strchr("_-+=./,:@%", c);
+  };
   if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) return word;
   std::string text = "'";
   for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
@@ -69,13 +71,15 @@ void addTo(CLI::App& app, const Option& option, const std::string& group) {
     try {
       option.set(text);
     } catch (const UsageError& error) {
-      const std::string shown = option.kind == Option::Kind::positional ? option.name : "--" + option.name;
+      const std::string shown =
+          option.kind == Option::Kind::positional ? option.name : "--" + option.name;
       throw UsageError(shown + ": " + error.what());
     }
   };
   CLI::Option* added = nullptr;
   if (option.kind == Option::Kind::flag) {
-    added = app.add_flag_callback(cliName(option), [set] { set("true"); }, option.help);
+    added = app.add_flag_callback(
+        cliName(option), [set] { set("true"); }, option.help);
   } else if (option.repeated) {
     added = app.add_option_function<std::vector<std::string>>(
         cliName(option),
@@ -86,16 +90,23 @@ void addTo(CLI::App& app, const Option& option, const std::string& group) {
   } else {
     added = app.add_option_function<std::string>(cliName(option), set, option.help);
   }
-  added->group(group)->option_text(option.value + (option.fallback.empty() ? "" : " [" + option.fallback + "]"));
+  added->group(group)->option_text(option.value +
+                                   (option.fallback.empty() ? "" : " [" + option.fallback + "]"));
   added->required(option.required);
-  if (option.kind == Option::Kind::value) added->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+  if (option.kind == Option::Kind::value)
+    added->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
 }
 
 }  // namespace
 
 double parseLengthMm(std::string_view text) {
-  constexpr std::array<std::pair<std::string_view, double>, 7> units{
-      {{"mm", 1.0}, {"um", 1e-3}, {"µm", 1e-3}, {"nm", 1e-6}, {"cm", 10.0}, {"in", 25.4}, {"m", 1000.0}}};
+  constexpr std::array<std::pair<std::string_view, double>, 7> units{{{"mm", 1.0},
+                                                                      {"um", 1e-3},
+                                                                      {"µm", 1e-3},
+                                                                      {"nm", 1e-6},
+                                                                      {"cm", 10.0},
+                                                                      {"in", 25.4},
+                                                                      {"m", 1000.0}}};
   const std::string wanted = "a length such as 0.042mm, 42um or 600dpi";
   if (text.ends_with("dpi")) {
     const double dots = parseNumber(text.substr(0, text.size() - 3), wanted);
@@ -152,7 +163,8 @@ void Options::text(std::string name, std::string& target, std::string value, std
   option.get = [&target] { return target; };
 }
 
-void Options::choice(std::string name, std::string& target, std::vector<std::string> choices, std::string help) {
+void Options::choice(std::string name, std::string& target, std::vector<std::string> choices,
+                     std::string help) {
   text(std::move(name), target, joined(choices, "|"), std::move(help));
   options_.back().set = [&target, choices = std::move(choices)](const std::string& text) {
     if (std::find(choices.begin(), choices.end(), text) == choices.end()) {
@@ -168,7 +180,8 @@ void Options::integer(std::string name, int& target, int min, int max, std::stri
   option.fallback = option.get();
   option.set = [&target, min, max](const std::string& text) {
     const bool bounded = max != std::numeric_limits<int>::max();
-    const std::string wanted = "a whole number " + range(min, bounded ? max : std::numeric_limits<double>::infinity());
+    const std::string wanted =
+        "a whole number " + range(min, bounded ? max : std::numeric_limits<double>::infinity());
     const double value = parseNumber(text, wanted);
     if (value != std::floor(value) || value < min || value > max) {
       throw UsageError("'" + text + "' is not " + wanted);
@@ -191,12 +204,15 @@ void Options::number(std::string name, double& target, double min, double max, s
 
 void Options::length(std::string name, double& target_mm, std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, "LENGTH", std::move(help));
-  option.get = [&target_mm] { return target_mm == 0 ? std::string() : shortestText(target_mm) + "mm"; };
+  option.get = [&target_mm] {
+    return target_mm == 0 ? std::string() : shortestText(target_mm) + "mm";
+  };
   option.fallback = option.get();
   option.set = [&target_mm](const std::string& text) { target_mm = parseLengthMm(text); };
 }
 
-void Options::triple(std::string name, openvdb::Vec3d& target, std::string value, std::string help) {
+void Options::triple(std::string name, openvdb::Vec3d& target, std::string value,
+                     std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
   option.get = [&target] {
     return shortestText(target[0]) + "," + shortestText(target[1]) + "," + shortestText(target[2]);
@@ -213,7 +229,8 @@ void Options::triple(std::string name, openvdb::Vec3d& target, std::string value
       begin = comma + 1;
     }
     if (count == 2) throw UsageError("'" + text + "' is not " + wanted);
-    target = count == 1 ? openvdb::Vec3d(values[0]) : openvdb::Vec3d(values[0], values[1], values[2]);
+    target =
+        count == 1 ? openvdb::Vec3d(values[0]) : openvdb::Vec3d(values[0], values[1], values[2]);
   };
 }
 
@@ -238,7 +255,8 @@ void Options::positionals(std::string name, std::vector<std::string>& targets, s
 }
 
 const Option* Options::find(std::string_view name) const {
-  const auto found = std::find_if(options_.begin(), options_.end(), [&](const Option& o) { return o.name == name; });
+  const auto found = std::find_if(options_.begin(), options_.end(),
+                                  [&](const Option& o) { return o.name == name; });
   return found == options_.end() ? nullptr : &*found;
 }
 
@@ -268,11 +286,12 @@ void Options::parse(std::span<const std::string> arguments, const Options& commo
   if (!extra.starts_with('-')) throw UsageError("unexpected argument '" + extra + "'; see --help");
   const std::string option_name = extra.substr(0, extra.find('='));
   const std::string near = nearestWord(option_name, names);
-  throw UsageError("no option '" + option_name + "'; " + (near.empty() ? "see --help" : "did you mean '" + near + "'?"));
+  throw UsageError("no option '" + option_name + "'; " +
+                   (near.empty() ? "see --help" : "did you mean '" + near + "'?"));
 }
 
-std::string Options::help(const std::string& verb, const std::string& summary, const std::string& example,
-                          const Options& common) const {
+std::string Options::help(const std::string& verb, const std::string& summary,
+                          const std::string& example, const Options& common) const {
   CLI::App app(summary, "vdbdither " + verb);
   app.set_help_flag();
   for (const Option& option : options_) addTo(app, option, "Options");
@@ -290,7 +309,8 @@ std::string Options::canonical() const {
     const std::string value = option.get();
     if (value == option.fallback) continue;
     if (option.kind != Option::Kind::positional) text += " --" + option.name;
-    if (option.kind != Option::Kind::flag) text += " " + (option.repeated ? value : quotedForShell(value));
+    if (option.kind != Option::Kind::flag)
+      text += " " + (option.repeated ? value : quotedForShell(value));
   }
   return text.empty() ? text : text.substr(1);
 }

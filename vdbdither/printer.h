@@ -22,7 +22,8 @@ struct PrinterProfile {
   std::string source;       ///< where these figures were taken from
   openvdb::Vec3d pitch_mm;  ///< voxel size across the carriage (x), along it (y), and the layer (z)
   openvdb::Vec3d build_mm;  ///< usable volume; zero where unknown
-  std::vector<Material> materials;  ///< model materials first to last; support is the printer's own affair
+  std::vector<Material>
+      materials;  ///< model materials first to last; support is the printer's own affair
 };
 
 }  // namespace vdbdither

@@ -10,12 +10,13 @@ namespace vdbdither {
 /// What travels ahead of the slabs: everything that is known before the first voxel.
 struct Schema {
   Lattice lattice;
-  /// Empty grids that stand for those of every slab: name, type, class, background, transform, metadata.
+  /// Empty grids that stand for those of every slab: name, type, class, background, transform,
+  /// metadata.
   Grids grids;
   /// File metadata by key: `vdbdither:history`, `vdbdither:printer`, `vdbdither:materials`, …
   std::map<std::string, std::string, std::less<>> metadata;
-  /// How many leaf nodes the surface crosses in the fullest row of leaves (eight layers); zero where unknown.
-  /// Feeds the estimate of memory only.
+  /// How many leaf nodes the surface crosses in the fullest row of leaves (eight layers); zero
+  /// where unknown. Feeds the estimate of memory only.
   double leaves_per_row = 0;
 };
 

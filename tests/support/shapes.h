@@ -9,7 +9,8 @@ namespace vdbdither::test {
 /// Closed, outward oriented meshes in mm, their vertices shared.
 Mesh boxMesh(const openvdb::Vec3d& min, const openvdb::Vec3d& max);
 
-/// A latitude-longitude sphere with `rings` bands of `2 * rings` quads; its vertices lie on the sphere.
+/// A latitude-longitude sphere with `rings` bands of `2 * rings` quads; its vertices lie on the
+/// sphere.
 Mesh sphereMesh(const openvdb::Vec3d& centre, double radius, int rings);
 
 /// A torus around the z axis; `rings` segments around the axis, half as many around the tube.

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <iosfwd>
+#include <map>
+#include <string>
+
+#include "vdbdither/schema.h"
+
+namespace vdbdither {
+
+/// The grids and the file metadata of one VDB archive.
+struct VdbContents {
+  Grids grids;
+  std::map<std::string, std::string, std::less<>> metadata;
+};
+
+/// How the voxels of an archive are packed. Inactive values are never stored.
+enum class VdbCodec { none, mask, blosc };
+
+/// Prepares OpenVDB (grid types, logging kept off stdout). Called once, before anything else of
+/// OpenVDB.
+void initializeVdb();
+
+/// Writes one ordinary archive that any OpenVDB tool opens; grids in order of their names. The same
+/// contents give the same bytes: the archive's UUID, which OpenVDB draws by chance, is replaced by
+/// a digest of everything else and serves as the checksum. Throws DataError naming `path` when the
+/// disk is full or the write fails otherwise.
+void writeVdb(const std::filesystem::path& path, const VdbContents& contents, VdbCodec codec);
+
+/// Reads a whole archive and checks its digest where it carries one. Throws DataError naming
+/// `path`.
+VdbContents readVdb(const std::filesystem::path& path);
+
+/// The same without the voxels: metadata and empty grids of the right type.
+VdbContents readVdbHead(const std::filesystem::path& path);
+
+/// The grid called `name` of a file; any name where the file has only one grid. Throws DataError.
+GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name);
+
+/// The archive as bytes, digest included; and back. `where` names the origin in errors.
+std::string archiveBytes(const VdbContents& contents, VdbCodec codec);
+
+/// The lattice, printer and history that metadata and transforms state. Files of other tools get
+/// the lattice of their first grid and the box of their active voxels. Throws DataError where a
+/// grid's transform is no scaling, or where grids disagree.
+Schema schemaOf(const VdbContents& contents, const std::string& where);
+
+/// Contents that carry `schema`: its metadata, the lattice's box, and the tool's name as `creator`.
+VdbContents contentsOf(const Schema& schema, Grids grids);
+
+}  // namespace vdbdither

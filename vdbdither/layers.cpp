@@ -1,0 +1,151 @@
+#include "vdbdither/layers.h"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+
+#include "vdbdither/errors.h"
+#include "vdbdither/openvdb.h"
+
+namespace vdbdither {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::GridBase;
+
+namespace {
+
+using CarriedGrids = openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid,
+                                       openvdb::Int64Grid, openvdb::Vec3SGrid, openvdb::Vec3DGrid,
+                                       openvdb::BoolGrid, openvdb::MaskGrid>;
+
+ZRange layersOf(const CoordBBox& box) { return {box.min().z(), box.max().z() + 1}; }
+
+bool within(ZRange inner, ZRange outer) {
+  return inner.begin >= outer.begin && inner.end <= outer.end;
+}
+
+/// Copies the part of a tree that lies in `range` into another one that has nothing there yet.
+template <typename TreeT>
+class LayerCopy {
+ public:
+  using Value = typename TreeT::ValueType;
+  using Leaf = typename TreeT::LeafNodeType;
+
+  LayerCopy(const TreeT& source, TreeT& target, ZRange range)
+      : source_(source), target_(target), accessor_(target), range_(range) {}
+
+  void run() {
+    const auto& root = source_.root();
+    for (auto tile = root.cbeginValueAll(); tile; ++tile) copyTile(tile, root.getLevel());
+    for (auto child = root.cbeginChildOn(); child; ++child) copyNode(*child);
+  }
+
+ private:
+  template <typename Node>
+  void copyNode(const Node& node) {
+    if (intersection(layersOf(node.getNodeBoundingBox()), range_).empty()) return;
+    for (auto tile = node.cbeginValueAll(); tile; ++tile) copyTile(tile, Node::LEVEL);
+    for (auto child = node.cbeginChildOn(); child; ++child) {
+      if constexpr (Node::LEVEL == 1) {
+        copyLeaf(*child);
+      } else {
+        copyNode(*child);
+      }
+    }
+  }
+
+  template <typename Tile>
+  void copyTile(const Tile& tile, int level) {
+    const Value value = tile.getValue();
+    if (tile.isValueOn() || value != target_.background())
+      fill(tile.getCoord(), level, value, tile.isValueOn());
+  }
+
+  /// Fills what `range_` has of the tile at `origin`, as few and as large tiles as can be.
+  void fill(const Coord& origin, int level, const Value& value, bool active) {
+    static constexpr std::array<int, 4> edges{1, Leaf::DIM, 16 * Leaf::DIM, 32 * 16 * Leaf::DIM};
+    const int edge = edges[level];
+    const ZRange layers{origin.z(), origin.z() + edge};
+    if (intersection(layers, range_).empty()) return;
+    if (within(layers, range_)) {
+      accessor_.addTile(level, origin, value, active);
+    } else if (level == 1) {
+      auto leaf = std::make_unique<Leaf>(origin, value, active);
+      cut(*leaf);
+      accessor_.addLeaf(leaf.release());
+    } else {
+      const int step = edges[level - 1];
+      for (int x = 0; x < edge; x += step) {
+        for (int y = 0; y < edge; y += step) {
+          for (int z = 0; z < edge; z += step)
+            fill(origin.offsetBy(x, y, z), level - 1, value, active);
+        }
+      }
+    }
+  }
+
+  /// Makes background of the layers outside `range_`.
+  void cut(Leaf& leaf) const {
+    for (openvdb::Index offset = 0; offset < Leaf::SIZE; ++offset) {
+      if (!range_.contains(leaf.offsetToGlobalCoord(offset).z()))
+        leaf.setValueOff(offset, target_.background());
+    }
+  }
+
+  void copyLeaf(const Leaf& leaf) {
+    const ZRange layers = layersOf(leaf.getNodeBoundingBox());
+    if (intersection(layers, range_).empty()) return;
+    auto copy = std::make_unique<Leaf>(leaf);
+    if (!within(layers, range_)) {
+      cut(*copy);
+      if (copy->isEmpty() && allBackground(*copy)) return;
+    }
+    accessor_.addLeaf(copy.release());
+  }
+
+  bool allBackground(const Leaf& leaf) const {
+    Value value;
+    bool active = false;
+    return leaf.isConstant(value, active) && !active && value == target_.background();
+  }
+
+  const TreeT& source_;
+  TreeT& target_;
+  openvdb::tree::ValueAccessor<TreeT> accessor_;
+  ZRange range_;
+};
+
+/// Calls `function` with the grid as what it is.
+template <typename Function>
+void visit(const GridBase& grid, const Function& function) {
+  if (!grid.apply<CarriedGrids>(function)) {
+    throw DataError("grid '" + grid.getName() + "' is of type " + grid.type() +
+                    ", which slabs cannot carry");
+  }
+}
+
+}  // namespace
+
+GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted) {
+  if (pieces.size() == 1 && within(pieces.front().range, wanted)) return pieces.front().grid;
+  GridConstPtr result;
+  visit(*pieces.front().grid, [&](const auto& first) {
+    using GridT = std::decay_t<decltype(first)>;
+    const auto joined = openvdb::gridPtrCast<GridT>(first.copyGridWithNewTree());
+    for (const Layers& piece : pieces) {
+      const ZRange range = intersection(piece.range, wanted);
+      if (range.empty()) continue;
+      const auto& grid = static_cast<const GridT&>(*piece.grid);
+      LayerCopy(grid.tree(), joined->tree(), range).run();
+    }
+    result = joined;
+  });
+  return result;
+}
+
+GridSize sizeOf(const GridConstPtr& grid) {
+  return {static_cast<double>(grid->memUsage()), static_cast<double>(grid->activeVoxelCount())};
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <span>
+
+#include "vdbdither/grid.h"
+#include "vdbdither/lattice.h"
+
+namespace vdbdither {
+
+/// A grid and the layers of it that count.
+struct Layers {
+  GridConstPtr grid;
+  ZRange range;
+};
+
+/// One grid of the layers of all `pieces` within `wanted`, and background elsewhere. The pieces
+/// agree in type, background, transform and metadata, and their ranges do not overlap. A piece that
+/// is all of the result comes back itself; otherwise nodes are copied. Throws DataError for a grid
+/// type that slabs cannot carry (points, strings).
+GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted);
+
+/// Bytes and active voxels of a grid.
+struct GridSize {
+  double bytes = 0;
+  double active_voxels = 0;
+};
+GridSize sizeOf(const GridConstPtr& grid);
+
+}  // namespace vdbdither
