@@ -11,7 +11,7 @@
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 
-#include "io/digest.h"
+#include "io/archive_digest.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/options.h"
@@ -25,26 +25,7 @@ using openvdb::Vec3d;
 
 namespace {
 
-// An archive begins with an 8-byte magic number, three 4-byte versions and the seekable flag; its
-// UUID follows.
-constexpr std::size_t uuid_offset = 21;
-constexpr std::size_t uuid_size = 36;
-
 constexpr const char* box_key = "vdbdither:box";
-
-/// The digest in the form of a UUID of version 8 (RFC 9562: vendor-specific), which tells it from
-/// OpenVDB's random ones.
-std::string uuidText(const Digest::Value& value) {
-  std::string hex = hexText(value).substr(0, 32);
-  hex[12] = '8';
-  hex[16] = 'a';
-  return hex.substr(0, 8) + "-" + hex.substr(8, 4) + "-" + hex.substr(12, 4) + "-" +
-         hex.substr(16, 4) + "-" + hex.substr(20);
-}
-
-bool isDigestUuid(std::string_view uuid) {
-  return uuid.size() == uuid_size && uuid[14] == '8' && uuid[19] == 'a';
-}
 
 std::uint32_t compressionFlags(VdbCodec codec) {
   switch (codec) {
@@ -97,7 +78,7 @@ std::pair<std::string, std::string> digestAndUuid(std::istream& stream) {
     }
     digest.update(buffer.data(), size);
   }
-  return {uuidText(digest.finish()), uuid};
+  return {uuidOf(digest.finish()), uuid};
 }
 
 std::string quoted(const std::filesystem::path& path) { return "'" + path.string() + "'"; }
@@ -180,6 +161,24 @@ Lattice latticeOf(const GridBase& grid, const std::string& where) {
 
 }  // namespace
 
+std::string uuidOf(const Digest::Value& value) {
+  std::string hex = hexText(value).substr(0, 32);
+  hex[12] = '8';
+  hex[16] = 'a';
+  return hex.substr(0, 8) + "-" + hex.substr(8, 4) + "-" + hex.substr(12, 4) + "-" +
+         hex.substr(16, 4) + "-" + hex.substr(20);
+}
+
+bool isDigestUuid(std::string_view uuid) {
+  return uuid.size() == uuid_size && uuid[14] == '8' && uuid[19] == 'a';
+}
+
+VdbContents contentsOf(openvdb::io::Stream& archive) {
+  const openvdb::GridPtrVecPtr grids = archive.getGrids();
+  for (const GridBase::Ptr& grid : *grids) dropFileStatistics(*grid);
+  return collected(*grids, *archive.getMetadata());
+}
+
 void initializeVdb() { openvdb::initialize(); }
 
 std::string archiveBytes(const VdbContents& contents, VdbCodec codec) {
@@ -189,14 +188,15 @@ std::string archiveBytes(const VdbContents& contents, VdbCodec codec) {
   std::fill_n(bytes.begin() + uuid_offset, uuid_size, '0');
   Digest digest;
   digest.update(bytes.data(), bytes.size());
-  const std::string uuid = uuidText(digest.finish());
+  const std::string uuid = uuidOf(digest.finish());
   std::copy(uuid.begin(), uuid.end(), bytes.begin() + uuid_offset);
   return bytes;
 }
 
-void writeVdb(const std::filesystem::path& path, const VdbContents& contents, VdbCodec codec) {
+void writeVdb(const std::filesystem::path& path, const VdbContents& contents, VdbCodec codec,
+              const std::filesystem::path& shown) {
   const auto failed = [&] {
-    return DataError("cannot write " + quoted(path) + ": " + std::strerror(errno ? errno : EIO));
+    return DataError("cannot write " + quoted(shown) + ": " + std::strerror(errno ? errno : EIO));
   };
   errno = 0;
   try {

@@ -24,9 +24,10 @@ void initializeVdb();
 
 /// Writes one ordinary archive that any OpenVDB tool opens; grids in order of their names. The same
 /// contents give the same bytes: the archive's UUID, which OpenVDB draws by chance, is replaced by
-/// a digest of everything else and serves as the checksum. Throws DataError naming `path` when the
+/// a digest of everything else and serves as the checksum. Throws DataError naming `shown` when the
 /// disk is full or the write fails otherwise.
-void writeVdb(const std::filesystem::path& path, const VdbContents& contents, VdbCodec codec);
+void writeVdb(const std::filesystem::path& path, const VdbContents& contents, VdbCodec codec,
+              const std::filesystem::path& shown);
 
 /// Reads a whole archive and checks its digest where it carries one. Throws DataError naming
 /// `path`.

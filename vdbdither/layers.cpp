@@ -4,6 +4,8 @@
 #include <array>
 #include <memory>
 
+#include <openvdb/tools/Prune.h>
+
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 
@@ -142,6 +144,15 @@ GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted) {
     result = joined;
   });
   return result;
+}
+
+GridConstPtr pruned(const GridConstPtr& grid) {
+  const GridBase::Ptr copy = grid->deepCopyGrid();
+  visit(*copy, [&](const auto& typed) {
+    using GridT = std::decay_t<decltype(typed)>;
+    openvdb::tools::prune(openvdb::gridPtrCast<GridT>(copy)->tree());
+  });
+  return copy;
 }
 
 GridSize sizeOf(const GridConstPtr& grid) {

@@ -19,6 +19,10 @@ struct Layers {
 /// type that slabs cannot carry (points, strings).
 GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted);
 
+/// The canonical form: nodes of one value and state are tiles, so that topology depends on the
+/// voxels alone.
+GridConstPtr pruned(const GridConstPtr& grid);
+
 /// Bytes and active voxels of a grid.
 struct GridSize {
   double bytes = 0;

@@ -1,1 +1,168 @@
-int main() { return 0; }
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <new>
+
+#include <nlohmann/json.hpp>
+
+#include "io/standard_streams.h"
+#include "io/vdb.h"
+#include "vdbdither/chain.h"
+#include "vdbdither/console.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/interrupt.h"
+#include "vdbdither/pipeline.h"
+#include "vdbdither/registry.h"
+#include "vdbdither/version.h"
+
+namespace vdbdither {
+namespace {
+
+std::string overview() {
+  std::string text =
+      "vdbdither: shape dithering for voxel-controlled 3D printing\n\n"
+      "Usage: vdbdither OPERATOR [arguments] [! OPERATOR [arguments] ...]\n"
+      "       vdbdither run \"OPERATOR ... | OPERATOR ...\"\n"
+      "       vdbdither help [OPERATOR]\n\nOperators:\n";
+  for (const OperatorInfo* info : registeredOperators()) {
+    text += "  " + std::string(info->name) +
+            std::string(18 - std::min<std::size_t>(17, info->name.size()), ' ') +
+            std::string(info->summary) + "\n";
+  }
+  return text +
+         "\nOperators read and write .vdb: -i and -o name files, pipes carry slabs, ! joins "
+         "operators in one process.\n"
+         "Example:\n"
+         "  vdbdither mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign ! "
+         "slice-export out\n";
+}
+
+std::string helpOf(const OperatorInfo& info) {
+  const std::unique_ptr<Operator> made = info.make();
+  Options options;
+  made->declare(options);
+  RunOptions run;
+  Options run_options;
+  run.declare(run_options);
+  return options.help(std::string(info.name), std::string(info.summary), std::string(info.example),
+                      run_options);
+}
+
+/// The words of the chain: the arguments themselves, or the line after `run`; behind a link named
+/// like an operator, that operator first.
+std::vector<std::string> chainWords(int argc, char** argv) {
+  std::vector<std::string> words(argv + 1, argv + argc);
+  const std::string called = std::filesystem::path(argv[0]).filename();
+  for (const OperatorInfo* info : registeredOperators()) {
+    if (called == info->name) words.insert(words.begin(), called);
+  }
+  if (!words.empty() && words.front() == "run") {
+    if (words.size() != 2) throw UsageError("run: takes one argument, the chain in quotes");
+    return splitWords(words[1]);
+  }
+  return words;
+}
+
+std::string reportJson(const Pipeline& pipeline, double seconds) {
+  nlohmann::ordered_json json;
+  json["version"] = version;
+  json["seconds"] = seconds;
+  json["layers"] = pipeline.layers();
+  json["box_voxels"] = pipeline.boxVoxels();
+  json["peak_memory_bytes"] = peakMemoryBytes();
+  json["stages"] = nlohmann::ordered_json::array();
+  for (const StageReport& stage : pipeline.reports()) {
+    nlohmann::ordered_json entry{{"name", stage.name},
+                                 {"seconds", stage.seconds},
+                                 {"active_voxels", stage.active_voxels},
+                                 {"bytes", stage.bytes},
+                                 {"peak_memory_bytes", stage.peak_memory_bytes}};
+    for (const auto& [name, value] : stage.counts) entry["counts"][name] = value;
+    json["stages"].push_back(entry);
+  }
+  return json.dump() + "\n";
+}
+
+void printStages(const Pipeline& pipeline, double seconds) {
+  for (const StageReport& stage : pipeline.reports()) {
+    std::fprintf(stderr, "%-16s %8.2f s  %12.0f voxels  %8s out  %8s peak\n", stage.name.c_str(),
+                 stage.seconds, stage.active_voxels, bytesText(stage.bytes).c_str(),
+                 bytesText(stage.peak_memory_bytes).c_str());
+    for (const auto& [name, value] : stage.counts) {
+      std::fprintf(stderr, "  %s %s\n", name.c_str(), shortestText(value).c_str());
+    }
+  }
+  std::fprintf(stderr, "%-16s %8.2f s  %8.0f Mvoxel/s of the box\n", "all", seconds,
+               pipeline.boxVoxels() / seconds / 1e6);
+}
+
+void runChain(const std::vector<std::string>& words) {
+  Pipeline pipeline(parseChain(words));
+  const RunOptions& options = pipeline.options();
+  if (const OperatorInfo* info = pipeline.helpWanted()) return printData(helpOf(*info).c_str());
+  Console console;
+  console.begin(options.quiet, 0);
+  const auto start = std::chrono::steady_clock::now();
+  pipeline.plan(console);
+  if (options.explain) return printData(pipeline.explanation().c_str());
+  console.begin(options.quiet || options.verbose, pipeline.boxVoxels());
+  try {
+    pipeline.run();
+  } catch (...) {
+    console.clear();
+    throw;
+  }
+  console.clear();
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (options.verbose) printStages(pipeline, seconds);
+  if (!options.json) return;
+  const std::string report = reportJson(pipeline, seconds);
+  // Where standard output carries voxels, the words go to standard error.
+  if (pipeline.writesToStandardOutput()) {
+    std::fputs(report.c_str(), stderr);
+  } else {
+    printData(report.c_str());
+  }
+}
+
+void runProgram(int argc, char** argv) {
+  const std::vector<std::string> words = chainWords(argc, argv);
+  if (words.empty()) throw UsageError("no operator; see vdbdither --help");
+  if (words.front() == "--version")
+    return printData((std::string("vdbdither ") + version + "\n").c_str());
+  if (words.front() == "--help" || words.front() == "-h" || words.front() == "help") {
+    return printData(words.size() > 1 ? helpOf(findOperator(words[1])).c_str()
+                                      : overview().c_str());
+  }
+  runChain(words);
+}
+
+int guardedMain(int argc, char** argv) {
+  const auto fail = [](const char* message, int code) {
+    std::fprintf(stderr, "vdbdither %s\n", message);
+    return code;
+  };
+  try {
+    setStandardOutputAside();
+    noteInterrupts();
+    initializeVdb();
+    runProgram(argc, argv);
+    return 0;
+  } catch (const Interrupted& error) {
+    fail(error.what(), 0);
+    return 128 + error.signal();
+  } catch (const UsageError& error) {
+    return fail(error.what(), 2);
+  } catch (const std::bad_alloc&) {
+    return fail("out of memory; try a smaller --slab or fewer --layers", 1);
+  } catch (const std::exception& error) {
+    return fail(error.what(), 1);
+  }
+}
+
+}  // namespace
+}  // namespace vdbdither
+
+int main(int argc, char** argv) { return vdbdither::guardedMain(argc, argv); }

@@ -49,6 +49,10 @@ class Operator {
   /// Bytes that the operator holds besides its slabs, known after `plan`.
   [[nodiscard]] virtual double memoryBytes() const { return 0; }
 
+  /// Whether it holds the whole volume at once, which --explain announces and --stream refuses.
+  /// Asked after `plan`.
+  [[nodiscard]] virtual bool isBarrier() const { return false; }
+
   void setReporter(Reporter* reporter) { reporter_ = reporter; }
 
  protected:
@@ -95,6 +99,8 @@ struct OperatorInfo {
   std::string_view summary;  ///< one sentence, no full stop
   std::string_view example;  ///< a whole chain that runs in a folder with a `part.stl`
   std::unique_ptr<Operator> (*make)();
+  /// Moves grids without changing them (read, write): leaves no line in the history.
+  bool transport = false;
 };
 
 }  // namespace vdbdither

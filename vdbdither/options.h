@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include <openvdb/math/Vec3.h>
+#include <openvdb/Types.h>
 
 namespace vdbdither {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <openvdb/math/Vec3.h>
+#include <openvdb/Types.h>
 
 namespace vdbdither {
 

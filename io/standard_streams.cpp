@@ -1,0 +1,38 @@
+#include "io/standard_streams.h"
+
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <unistd.h>
+
+#include "vdbdither/errors.h"
+
+namespace vdbdither {
+
+namespace {
+
+int data_descriptor = STDOUT_FILENO;
+
+}  // namespace
+
+void setStandardOutputAside() {
+  const int copy = ::dup(STDOUT_FILENO);
+  if (copy < 0) return;
+  data_descriptor = copy;
+  ::dup2(STDERR_FILENO, STDOUT_FILENO);
+}
+
+int dataOutput() { return data_descriptor; }
+
+void printData(const char* text) {
+  for (std::size_t left = std::strlen(text); left > 0;) {
+    const ssize_t count = ::write(data_descriptor, text, left);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0)
+      throw DataError(std::string("cannot write to standard output: ") + std::strerror(errno));
+    text += count;
+    left -= static_cast<std::size_t>(count);
+  }
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,116 @@
+#include <mutex>
+#include <unistd.h>
+#include <vector>
+
+#include "io/frames.h"
+#include "io/vdb.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/layers.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+/// Slabs of a .vdb file, or frames of a pipe. Stands in at the head of a chain that begins without
+/// a source.
+class ReadOperator : public Source {
+ public:
+  void declare(Options& options) override {
+    options.positional("file", path_, "the .vdb to read; - or nothing is standard input", false);
+    options.text("grids", names_, "NAME,NAME", "only these grids");
+  }
+
+  Schema plan() override {
+    if (isPipe() && ::isatty(STDIN_FILENO)) {
+      throw UsageError(
+          "nothing is piped in; name a source first (mesh2sdf part.stl), or a file: -i part.vdb");
+    }
+    Schema schema;
+    if (isPipe()) {
+      frames_ = std::make_unique<FrameReader>(STDIN_FILENO, "standard input");
+      schema = frames_->schema();
+    } else {
+      schema = schemaOf(readVdbHead(path_), "'" + path_ + "'");
+    }
+    keepNamed(schema.grids);
+    kept_ = schema.grids;
+    return schema;
+  }
+
+  [[nodiscard]] bool isBarrier() const override { return !isPipe(); }
+
+  [[nodiscard]] Grids run(ZRange core) const override {
+    const std::lock_guard lock(mutex_);
+    if (isPipe()) {
+      takeFrames(core);
+    } else if (slabs_.empty()) {
+      const Grids grids = readVdb(path_).grids;
+      slabs_.push_back({{}, {}, grids});
+      // The file's own box may be smaller than what it holds; every layer counts.
+      slabs_.back().core = {std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};
+    }
+    Grids result;
+    for (const auto& [name, prototype] : kept_) {
+      std::vector<Layers> pieces;
+      for (const Slab& slab : slabs_) {
+        const auto found = slab.grids.find(name);
+        if (found != slab.grids.end()) pieces.push_back({found->second, slab.core});
+      }
+      if (!pieces.empty()) result[name] = joinLayers(pieces, core);
+    }
+    return result;
+  }
+
+ private:
+  [[nodiscard]] bool isPipe() const { return path_.empty() || path_ == "-"; }
+
+  /// Frames come in rising z and so do the cores asked of a pipe: what lies below is dropped, what
+  /// is missing is fetched.
+  void takeFrames(ZRange core) const {
+    std::erase_if(slabs_, [&](const Slab& slab) { return slab.core.end <= core.begin; });
+    while (!ended_ && (slabs_.empty() || slabs_.back().core.end < core.end)) {
+      std::optional<Slab> slab = frames_->next();
+      ended_ = !slab;
+      if (slab && slab->core.end > core.begin) slabs_.push_back(std::move(*slab));
+    }
+    // The closing frame must be seen before anything downstream is published.
+    if (core.end >= frames_->schema().lattice.layers().end && !ended_) ended_ = !frames_->next();
+  }
+
+  void keepNamed(Grids& grids) const {
+    if (names_.empty()) return;
+    Grids kept;
+    for (std::size_t begin = 0; begin <= names_.size();) {
+      const std::size_t comma = std::min(names_.find(',', begin), names_.size());
+      const std::string name = names_.substr(begin, comma - begin);
+      const auto found = grids.find(name);
+      if (found == grids.end()) {
+        std::string message = "--grids: no grid '" + name + "'; there are";
+        for (const auto& [known, grid] : grids) message += " " + known;
+        throw UsageError(message);
+      }
+      kept.insert(*found);
+      begin = comma + 1;
+    }
+    grids = kept;
+  }
+
+  std::string path_;
+  std::string names_;
+  Grids kept_;
+  std::unique_ptr<FrameReader> frames_;
+  mutable std::mutex mutex_;
+  mutable std::vector<Slab> slabs_;
+  mutable bool ended_ = false;
+};
+
+}  // namespace
+
+extern const OperatorInfo read{
+    "read", "take slabs from a .vdb file or from standard input",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! normals -o normals.vdb",
+    [] { return std::unique_ptr<Operator>(std::make_unique<ReadOperator>()); }, true};
+
+}  // namespace vdbdither

@@ -1,0 +1,87 @@
+#include <map>
+#include <optional>
+#include <unistd.h>
+#include <vector>
+
+#include "io/frames.h"
+#include "io/staged_output.h"
+#include "io/standard_streams.h"
+#include "io/vdb.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/layers.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+/// Slabs into one .vdb file, or as frames on a pipe. Stands in at the end of a chain that ends
+/// without a sink; in the middle it archives the stage.
+class WriteOperator : public Sink {
+ public:
+  void declare(Options& options) override {
+    options.positional("file", path_, "the .vdb to write; - or nothing is standard output", false);
+    options.choice("codec", codec_, {"blosc", "mask", "none"}, "how a file's voxels are packed");
+    options.flag("overwrite", overwrite_, "replace the file if it is there");
+  }
+
+  void plan(const Schema& in) override {
+    schema_ = in;
+    if (in.grids.empty()) throw UsageError("there is no grid to write");
+    if (!isPipe()) {
+      StagedOutput::check(path_, StagedOutput::Kind::file, overwrite_);
+      output_.emplace(path_, StagedOutput::Kind::file);
+    } else if (::isatty(dataOutput())) {
+      throw UsageError(
+          "VDB data is not for a terminal; name a file with -o, or pipe it into another operator");
+    } else {
+      frames_.emplace(dataOutput());
+      frames_->head(schema_);
+    }
+  }
+
+  [[nodiscard]] bool isBarrier() const override { return !isPipe(); }
+
+  void write(const Slab& in) override {
+    if (frames_) {
+      frames_->slab(in);
+    } else {
+      for (const auto& [name, grid] : in.grids) pieces_[name].push_back({grid, in.core});
+    }
+  }
+
+  void finish() override {
+    if (frames_) return frames_->end();
+    Grids grids;
+    for (auto& [name, pieces] : pieces_) {
+      grids[name] = pruned(joinLayers(pieces, schema_.lattice.layers()));
+      pieces.clear();
+    }
+    if (grids.empty()) grids = schema_.grids;
+    const VdbCodec codec = codec_ == "none"   ? VdbCodec::none
+                           : codec_ == "mask" ? VdbCodec::mask
+                                              : VdbCodec::blosc;
+    writeVdb(output_->path(), contentsOf(schema_, grids), codec, path_);
+    output_->commit();
+  }
+
+ private:
+  [[nodiscard]] bool isPipe() const { return path_.empty() || path_ == "-"; }
+
+  std::string path_;
+  std::string codec_ = "blosc";
+  bool overwrite_ = false;
+  Schema schema_;
+  std::optional<FrameWriter> frames_;
+  std::optional<StagedOutput> output_;
+  std::map<std::string, std::vector<Layers>> pieces_;
+};
+
+}  // namespace
+
+extern const OperatorInfo write{
+    "write", "put slabs into a .vdb file, or on standard output",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! dither -o solid.vdb",
+    [] { return std::unique_ptr<Operator>(std::make_unique<WriteOperator>()); }, true};
+
+}  // namespace vdbdither

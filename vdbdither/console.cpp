@@ -1,0 +1,56 @@
+#include "vdbdither/console.h"
+
+#include <array>
+#include <cstdio>
+#include <unistd.h>
+
+namespace vdbdither {
+
+namespace {
+
+std::string clockText(double seconds) {
+  const int whole = static_cast<int>(seconds + 0.5);
+  std::array<char, 32> text{};
+  if (whole < 3600) {
+    std::snprintf(text.data(), text.size(), "%d:%02d", whole / 60, whole % 60);
+  } else {
+    std::snprintf(text.data(), text.size(), "%d:%02d:%02d", whole / 3600, whole / 60 % 60,
+                  whole % 60);
+  }
+  return text.data();
+}
+
+}  // namespace
+
+void Console::begin(bool quiet, double box_voxels) {
+  terminal_ = !quiet && ::isatty(STDERR_FILENO);
+  box_voxels_ = box_voxels;
+  start_ = last_ = Clock::now();
+}
+
+void Console::warn(const std::string& stage, const std::string& text) {
+  clear();
+  std::fprintf(stderr, "vdbdither %s: warning: %s\n", stage.c_str(), text.c_str());
+}
+
+void Console::progress(const std::string& stage, int done, int total, double fraction) {
+  const Clock::time_point now = Clock::now();
+  if (!terminal_ || now - last_ < std::chrono::milliseconds(100)) return;
+  last_ = now;
+  const double share = done == 0 || total == 0 ? fraction : static_cast<double>(done) / total;
+  const double seconds = std::chrono::duration<double>(now - start_).count();
+  std::fprintf(stderr, "\r\033[K%-16s %3d %%", stage.c_str(), static_cast<int>(100 * share));
+  if (done > 0 && share > 0) {
+    std::fprintf(stderr, "  %.0f Mvoxel/s  %s left", share * box_voxels_ / seconds / 1e6,
+                 clockText(seconds * (1 - share) / share).c_str());
+  }
+  std::fflush(stderr);
+  shown_ = true;
+}
+
+void Console::clear() {
+  if (shown_) std::fputs("\r\033[K", stderr);
+  shown_ = false;
+}
+
+}  // namespace vdbdither

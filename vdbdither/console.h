@@ -1,0 +1,31 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "vdbdither/pipeline.h"
+
+namespace vdbdither {
+
+/// Tells a person at a terminal how a run goes: one line on standard error that is written over,
+/// with percent, rate and time left. Elsewhere it only passes warnings on.
+class Console : public Watcher {
+ public:
+  /// `quiet`: warnings only. `box_voxels`: what the whole run goes through, for the rate.
+  void begin(bool quiet, double box_voxels);
+  void warn(const std::string& stage, const std::string& text) override;
+  void progress(const std::string& stage, int done, int total, double fraction) override;
+  /// Takes the line away.
+  void clear();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  bool shown_ = false;
+  bool terminal_ = false;
+  double box_voxels_ = 0;
+  Clock::time_point start_;
+  Clock::time_point last_;
+};
+
+}  // namespace vdbdither

@@ -1,0 +1,35 @@
+#include "vdbdither/interrupt.h"
+
+#include <csignal>
+#include <cstring>
+#include <string>
+
+namespace vdbdither {
+
+namespace {
+
+volatile std::sig_atomic_t noted_signal = 0;
+
+void note(int number) {
+  if (noted_signal) {
+    std::signal(number, SIG_DFL);
+    std::raise(number);
+  }
+  noted_signal = number;
+}
+
+}  // namespace
+
+Interrupted::Interrupted(int signal_number)
+    : Error(std::string("stopped: ") + strsignal(signal_number)), signal_(signal_number) {}
+
+void noteInterrupts() {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) std::signal(number, note);
+  std::signal(SIGPIPE, SIG_IGN);
+}
+
+void throwIfInterrupted() {
+  if (noted_signal) throw Interrupted(noted_signal);
+}
+
+}  // namespace vdbdither

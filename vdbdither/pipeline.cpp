@@ -1,0 +1,411 @@
+#include "vdbdither/pipeline.h"
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <sstream>
+#include <sys/resource.h>
+
+#include <tbb/global_control.h>
+
+#include "vdbdither/errors.h"
+#include "vdbdither/interrupt.h"
+#include "vdbdither/layers.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/registry.h"
+
+namespace vdbdither {
+
+namespace {
+
+constexpr const char* history_key = "vdbdither:history";
+constexpr const char* source_verb = "read";
+constexpr const char* sink_verb = "write";
+
+constexpr int tallest_auto_slab = 64;
+
+/// Runs `function` for a stage; what it throws names the stage.
+template <typename Function>
+auto inStage(const std::string& name, const Function& function) {
+  try {
+    return function();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const UsageError& error) {
+    throw UsageError(name + ": " + error.what());
+  } catch (const DataError& error) {
+    throw DataError(name + ": " + error.what());
+  } catch (const std::bad_alloc&) {
+    throw DataError(name + ": out of memory; try a smaller --slab or fewer layers");
+  } catch (const std::exception& error) {
+    throw DataError(name + ": " + error.what());
+  }
+}
+
+double bytesPerVoxel(const openvdb::GridBase& grid) {
+  const std::string type = grid.valueType();
+  if (type == "bool" || type == "mask") return 0.125;
+  const double component = type.ends_with("d") || type == "int64" || type == "double" ? 8 : 4;
+  return type.starts_with("vec3") ? 3 * component : component;
+}
+
+/// What the leaves of one row (eight layers) of all grids take.
+double bytesPerRow(const Schema& schema) {
+  constexpr double leaf_overhead_bytes = 128;
+  double bytes = 0;
+  for (const auto& [name, grid] : schema.grids)
+    bytes += 512 * bytesPerVoxel(*grid) + leaf_overhead_bytes;
+  return bytes * schema.leaves_per_row;
+}
+
+ZRange parseLayers(const std::string& text, ZRange all) {
+  if (text.empty()) return all;
+  ZRange range;
+  char colon = 0;
+  std::istringstream stream(text);
+  if (!(stream >> range.begin >> colon >> range.end) || colon != ':' || !stream.eof() ||
+      range.begin < 0 || range.empty() || range.end > all.size()) {
+    throw UsageError("--layers: '" + text +
+                     "' is not A:B with 0 <= A < B <= " + std::to_string(all.size()));
+  }
+  return {all.begin + range.begin, all.begin + range.end};
+}
+
+double availableMemoryBytes() {
+  std::ifstream file("/proc/meminfo");
+  std::string line;
+  while (std::getline(file, line)) {
+    std::istringstream words(line);
+    std::string key;
+    double kilobytes = 0;
+    words >> key >> kilobytes;
+    if (key == "MemAvailable:") return kilobytes * 1024;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+double peakMemoryBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) * 1024;
+}
+
+/// An operator in its place: its options, what it plans, what stands in front of it, what it
+/// reports.
+class Pipeline::Stage : public Reporter {
+ public:
+  explicit Stage(const OperatorInfo& info) : info_(info), operator_(info.make()) {
+    operator_->declare(options_);
+    operator_->setReporter(this);
+    report_.name = info.name;
+  }
+
+  void parse(const std::vector<std::string>& arguments, const Options& common) {
+    inStage(name(), [&] { options_.parse(arguments, common); });
+  }
+
+  void plan(const Schema* in) {
+    inStage(name(), [&] {
+      if (source()) {
+        out_ = source()->plan();
+      } else if (filter()) {
+        out_ = filter()->plan(*in);
+        reads_ = filter()->reads();
+      } else {
+        out_ = *in;
+        sink()->plan(*in);
+      }
+    });
+    if (info_.transport || sink()) return;
+    std::string& history = out_.metadata[history_key];
+    if (!history.empty()) history += '\n';
+    history += name();
+    if (const std::string arguments = options_.canonical(); !arguments.empty())
+      history += ' ' + arguments;
+  }
+
+  void warn(const std::string& text) override { watcher->warn(name(), text); }
+
+  void count(const std::string& what, double value) override {
+    report_.counts.emplace_back(what, value);
+  }
+
+  void progress(double fraction) override {
+    throwIfInterrupted();
+    watcher->progress(name(), done_layers, total_layers, fraction);
+  }
+
+  /// Runs one call of the operator, timed.
+  template <typename Function>
+  auto timed(const Function& function) {
+    throwIfInterrupted();
+    struct Timer {
+      StageReport& report;
+      std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+      ~Timer() {
+        report.seconds +=
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        report.peak_memory_bytes = peakMemoryBytes();
+      }
+    } timer{report_};
+    return inStage(name(), function);
+  }
+
+  /// Counts a slab that leaves the stage.
+  void countOutput(const Grids& grids) {
+    for (const auto& [grid_name, grid] : grids) {
+      const GridSize size = sizeOf(grid);
+      report_.active_voxels += size.active_voxels;
+      report_.bytes += size.bytes;
+    }
+  }
+
+  /// Grids that the schema promises and nobody made are empty.
+  void complete(Grids& grids) const {
+    for (const auto& [grid_name, prototype] : out_.grids) grids.try_emplace(grid_name, prototype);
+  }
+
+  [[nodiscard]] std::string name() const { return std::string(info_.name); }
+  [[nodiscard]] const OperatorInfo& info() const { return info_; }
+  [[nodiscard]] const Options& options() const { return options_; }
+  [[nodiscard]] const Schema& out() const { return out_; }
+  [[nodiscard]] const StageReport& report() const { return report_; }
+  [[nodiscard]] const std::vector<Read>& reads() const { return reads_; }
+  [[nodiscard]] bool isBarrier() const { return operator_->isBarrier() || widest(reads_).whole; }
+  [[nodiscard]] double memoryBytes() const { return operator_->memoryBytes(); }
+  [[nodiscard]] Source* source() const { return dynamic_cast<Source*>(operator_.get()); }
+  [[nodiscard]] Filter* filter() const { return dynamic_cast<Filter*>(operator_.get()); }
+  [[nodiscard]] Sink* sink() const { return dynamic_cast<Sink*>(operator_.get()); }
+
+  Watcher* watcher = nullptr;
+  ZRange cores;  ///< the layers this stage is to give out
+  std::optional<Window> window;
+  int done_layers = 0;
+  int total_layers = 0;
+
+ private:
+  const OperatorInfo& info_;
+  Options options_;
+  std::unique_ptr<Operator> operator_;
+  Schema out_;
+  std::vector<Read> reads_;
+  StageReport report_;
+};
+
+Pipeline::Pipeline(const std::vector<Step>& steps) {
+  options_.declare(run_options_);
+  for (const Step& step : steps) {
+    addStage(step);
+    if (help_) return;
+  }
+  if (!stages_.front()->source()) {
+    std::vector<std::string> arguments;
+    if (!options_.input.empty()) arguments = {options_.input};
+    stages_.insert(stages_.begin(), std::make_unique<Stage>(findOperator(source_verb)));
+    stages_.front()->parse(arguments, run_options_);
+  } else if (!options_.input.empty()) {
+    throw UsageError("--input: the chain begins with " + stages_.front()->name() +
+                     ", which reads its own input");
+  }
+  if (!stages_.back()->sink()) {
+    std::vector<std::string> arguments{options_.output.empty() ? "-" : options_.output};
+    if (options_.overwrite) arguments.emplace_back("--overwrite");
+    addStage({sink_verb, arguments});
+    standard_output_ = options_.output.empty();
+  } else if (!options_.output.empty()) {
+    throw UsageError("--output: the chain ends with " + stages_.back()->name() +
+                     ", which names its own output");
+  }
+}
+
+Pipeline::~Pipeline() = default;
+
+void Pipeline::addStage(const Step& step) {
+  const OperatorInfo& info = findOperator(step.verb);
+  if (std::any_of(step.arguments.begin(), step.arguments.end(), [](const std::string& argument) {
+        return argument == "--help" || argument == "-h";
+      })) {
+    help_ = &info;
+    return;
+  }
+  auto stage = std::make_unique<Stage>(info);
+  if (stage->source() && !stages_.empty()) {
+    throw UsageError(stage->name() + ": makes slabs of its own and can only begin a chain");
+  }
+  stage->parse(step.arguments, run_options_);
+  stages_.push_back(std::move(stage));
+}
+
+void Pipeline::plan(Watcher& watcher) {
+  watcher_ = &watcher;
+  const Schema* schema = nullptr;
+  for (const auto& stage : stages_) {
+    stage->watcher = &watcher;
+    stage->plan(schema);
+    schema = &stage->out();
+  }
+  if (options_.stream) {
+    for (const auto& stage : stages_) {
+      if (stage->isBarrier()) {
+        throw UsageError(stage->name() +
+                         ": needs the whole volume at once, which --stream forbids");
+      }
+    }
+  }
+  wanted_ = parseLayers(options_.layers, schema->lattice.layers());
+  planRanges();
+  planSlabs();
+}
+
+void Pipeline::planRanges() {
+  ZRange need = wanted_;
+  for (auto stage = stages_.rbegin(); stage != stages_.rend(); ++stage) {
+    const ZRange all = (*stage)->out().lattice.layers();
+    (*stage)->total_layers = wanted_.size();
+    if ((*stage)->sink()) continue;
+    (*stage)->cores = intersection(alignedToLeaves(need), all);
+    if ((*stage)->filter()) need = reached((*stage)->cores, widest((*stage)->reads()), all);
+  }
+  ZRange coming = stages_.front()->cores;
+  for (const auto& stage : stages_) {
+    if (!stage->filter()) continue;
+    stage->window.emplace(stage->reads(), coming, stage->cores);
+    coming = stage->cores;
+  }
+}
+
+void Pipeline::planSlabs() {
+  const double budget = memoryBudgetBytes();
+  if (options_.slab == "all") {
+    slab_layers_ = alignedToLeaves(stages_.front()->cores).size();
+  } else if (options_.slab == "auto") {
+    slab_layers_ = tallest_auto_slab;
+    while (slab_layers_ > leaf_layers && expectedMemoryBytes(slab_layers_) > budget)
+      slab_layers_ /= 2;
+  } else {
+    std::istringstream stream(options_.slab);
+    if (!(stream >> slab_layers_) || !stream.eof() || slab_layers_ < leaf_layers ||
+        slab_layers_ % leaf_layers != 0) {
+      throw UsageError("--slab: '" + options_.slab + "' is not a multiple of 8, auto or all");
+    }
+  }
+  const double expected = expectedMemoryBytes(slab_layers_);
+  if (expected > budget && !options_.explain) {
+    throw DataError("the run needs about " + bytesText(expected) + " of memory and may use " +
+                    bytesText(budget) +
+                    "; take a smaller --slab, fewer --layers, or more --memory");
+  }
+}
+
+double Pipeline::memoryBudgetBytes() const {
+  return options_.memory == "auto" ? 0.8 * availableMemoryBytes() : parseBytes(options_.memory);
+}
+
+double Pipeline::expectedMemoryBytes(int slab_layers) const {
+  constexpr double program_bytes = 40e6;
+  double bytes = program_bytes;
+  for (const auto& stage : stages_) {
+    bytes += stage->memoryBytes();
+    // A window holds the slabs its reach covers, and the filter's input is a copy of them.
+    const int all = stage->out().lattice.layers().size();
+    const Reach reach = widest(stage->reads());
+    const int window_layers =
+        reach.whole || stage->isBarrier() ? all : slab_layers + reach.below + reach.above;
+    const double rows = std::min(all, window_layers) / static_cast<double>(leaf_layers) + 1;
+    bytes += bytesPerRow(stage->out()) * rows * (stage->filter() ? 2 : 1);
+  }
+  return bytes;
+}
+
+double Pipeline::boxVoxels() const {
+  const openvdb::CoordBBox& box = stages_.back()->out().lattice.box;
+  return static_cast<double>(box.dim().x()) * box.dim().y() * wanted_.size();
+}
+
+std::string Pipeline::explanation() const {
+  const Lattice& lattice = stages_.back()->out().lattice;
+  std::ostringstream text;
+  text << "lattice   " << shortestText(lattice.pitch_mm[0]) << " x "
+       << shortestText(lattice.pitch_mm[1]) << " x " << shortestText(lattice.pitch_mm[2]) << " mm, "
+       << lattice.box.dim().x() << " x " << lattice.box.dim().y() << " x " << lattice.box.dim().z()
+       << " voxels\n";
+  text << "layers    " << wanted_.size() << " of " << lattice.layers().size() << ", in slabs of "
+       << slab_layers_ << "\n";
+  for (const auto& stage : stages_) {
+    text << "stage     " << stage->name();
+    if (const std::string arguments = stage->options().canonical(); !arguments.empty())
+      text << ' ' << arguments;
+    const Reach reach = widest(stage->reads());
+    if (stage->isBarrier()) {
+      text << "  (barrier: holds the whole volume)";
+    } else if (stage->filter()) {
+      text << "  (reads " << reach.below << " layers below, " << reach.above << " above)";
+    }
+    text << "  ->";
+    for (const auto& [name, grid] : stage->out().grids) text << ' ' << name;
+    if (stage->memoryBytes() > 0) text << ", holds " << bytesText(stage->memoryBytes());
+    text << "\n";
+  }
+  text << "memory    about " << bytesText(expectedMemoryBytes(slab_layers_)) << " of "
+       << bytesText(memoryBudgetBytes()) << "\n";
+  return text.str();
+}
+
+void Pipeline::run() {
+  std::optional<tbb::global_control> threads;
+  if (options_.threads > 0) {
+    threads.emplace(tbb::global_control::max_allowed_parallelism, options_.threads);
+  }
+  Stage& source = *stages_.front();
+  for (int begin = source.cores.begin; begin < source.cores.end;) {
+    // Cuts lie at multiples of the height whatever the first layer is, so that slabs of two runs
+    // coincide.
+    const int cut = begin - ((begin % slab_layers_) + slab_layers_) % slab_layers_ + slab_layers_;
+    const ZRange core{begin, std::min(cut, source.cores.end)};
+    Grids grids = source.timed([&] { return source.source()->run(core); });
+    source.complete(grids);
+    if (options_.json || options_.verbose) source.countOutput(grids);
+    push(1, {core, core, std::move(grids)});
+    begin = core.end;
+  }
+  for (const auto& stage : stages_) {
+    if (stage->sink()) stage->timed([&] { stage->sink()->finish(); });
+  }
+}
+
+void Pipeline::push(std::size_t index, Slab slab) {
+  if (index == stages_.size()) {
+    const ZRange done = intersection(slab.core, wanted_);
+    for (const auto& stage : stages_) stage->done_layers += done.size();
+    watcher_->progress(stages_.back()->name(), stages_.back()->done_layers, wanted_.size(), 0);
+    return;
+  }
+  Stage& stage = *stages_[index];
+  if (stage.sink()) {
+    const ZRange core = intersection(slab.core, wanted_);
+    if (!core.empty()) stage.timed([&] { stage.sink()->write(cutTo(slab, core)); });
+    push(index + 1, std::move(slab));
+    return;
+  }
+  for (Window::Task& task : stage.window->push(std::move(slab))) {
+    Grids made = stage.timed([&] { return stage.filter()->run(task.input); });
+    for (const auto& [name, grid] : task.passing.grids) {
+      if (stage.out().grids.contains(name)) made.try_emplace(name, grid);
+    }
+    stage.complete(made);
+    if (options_.json || options_.verbose) stage.countOutput(made);
+    const ZRange core = task.passing.core;
+    task = {};
+    push(index + 1, {core, core, std::move(made)});
+  }
+}
+
+std::vector<StageReport> Pipeline::reports() const {
+  std::vector<StageReport> reports;
+  for (const auto& stage : stages_) reports.push_back(stage->report());
+  return reports;
+}
+
+}  // namespace vdbdither

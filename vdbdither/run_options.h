@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+
+#include "vdbdither/options.h"
+
+namespace vdbdither {
+
+/// The options that every operator takes. They concern the run as a whole, wherever in a chain they
+/// stand.
+struct RunOptions {
+  std::string input;   ///< .vdb for a chain that begins without a source; empty: standard input
+  std::string output;  ///< .vdb for a chain that ends without a sink; empty: standard output
+  bool overwrite = false;
+  int threads = 0;  ///< 0: all
+  std::string slab = "auto";
+  std::string memory = "auto";
+  std::string layers;  ///< A:B, counted from the bottom of the job; empty: all
+  bool stream = false;
+  bool explain = false;
+  bool json = false;
+  bool quiet = false;
+  bool verbose = false;
+  bool help = false;
+  bool version = false;
+
+  void declare(Options& options);
+};
+
+/// A size such as 512MiB, 4GiB, 2e9 (bytes). Throws UsageError.
+double parseBytes(const std::string& text);
+
+/// 1.5 GiB, 12 MiB, 640 B.
+std::string bytesText(double bytes);
+
+}  // namespace vdbdither
