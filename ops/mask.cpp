@@ -1,0 +1,159 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <mutex>
+
+#include <openvdb/openvdb.h>
+
+#include "ops/kernels/void_and_cluster.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::Coord;
+
+constexpr int greatest_size = 256;
+
+/// The ranks of a Bayer (ordered) mask whose edges are powers of two, x fastest: the bits of the
+/// exclusive or of the coordinates, the lowest first, decide most.
+std::vector<std::uint32_t> bayerRanks(const Coord& size) {
+  std::vector<std::uint32_t> ranks;
+  const int bits =
+      std::bit_width(static_cast<unsigned>(std::max({size.x(), size.y(), size.z()}) - 1));
+  for (int z = 0; z < size.z(); ++z) {
+    for (int y = 0; y < size.y(); ++y) {
+      for (int x = 0; x < size.x(); ++x) {
+        std::uint32_t rank = 0;
+        for (int bit = 0; bit < bits; ++bit) {
+          if (size.x() >> bit > 1) rank = 2 * rank + ((x ^ y ^ z) >> bit & 1);
+          if (size.y() >> bit > 1) rank = 2 * rank + ((y ^ z) >> bit & 1);
+          if (size.z() >> bit > 1) rank = 2 * rank + (z >> bit & 1);
+        }
+        ranks.push_back(rank);
+      }
+    }
+  }
+  return ranks;
+}
+
+class Mask : public Source {
+ public:
+  void declare(Options& options) override {
+    options.triple("size", size_, "N", "Period of the tile along x, y, z, voxels, 1 to 256");
+    options.choice("kind", kind_, {"void-and-cluster", "white", "bayer"},
+                   "How the ranks are ordered: blue noise, white noise, or ordered dither");
+    options.choice("kernel", kernel_, {"peters", "gauss", "axis-mix"},
+                   "Void and cluster: the Gaussian filtered on the DFT, sampled, or mixed with its "
+                   "lattice planes");
+    options.triple("sigma", sigma_, "S",
+                   "Void and cluster: standard deviation of the Gaussian along x, y, z, voxels");
+    options.number("plane-sigma", plane_sigma_, 0.3, 16,
+                   "axis-mix: standard deviation in the lattice planes, voxels");
+    options.number("space-weight", space_weight_, 0, 1e6,
+                   "axis-mix: weight of the Gaussian in space");
+    options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the random start");
+  }
+
+  Schema plan() override {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double edge = size_[axis];
+      if (!(edge >= 1 && edge <= greatest_size && edge == std::floor(edge))) {
+        throw UsageError("--size: " + shortestText(edge) +
+                         " is no period; whole numbers from 1 to 256 are");
+      }
+      if (kind_ == "bayer" && !std::has_single_bit(static_cast<unsigned>(edge))) {
+        throw UsageError("--size: " + shortestText(edge) +
+                         " is no power of two, which --kind bayer needs");
+      }
+      if (!(sigma_[axis] >= 0.3 && sigma_[axis] <= 16)) {
+        throw UsageError("--sigma: " + shortestText(sigma_[axis]) +
+                         " is out of range; 0.3 to 16 are accepted");
+      }
+    }
+    const Coord size = tileSize();
+    Schema schema;
+    schema.lattice.box = openvdb::CoordBBox(Coord(0, 0, 0), size.offsetBy(-1));
+    schema.grids["mask"] = emptyGrid();
+    return schema;
+  }
+
+  [[nodiscard]] double memoryBytes() const override {
+    const Coord size = tileSize();
+    const double ranks = 4.0 * size.x() * size.y() * size.z();
+    return kind_ == "void-and-cluster" ? 6 * ranks : ranks;
+  }
+
+  [[nodiscard]] Grids run(ZRange core) const override {
+    std::call_once(made_, [&] { ranks_ = makeRanks(); });
+    const Coord size = tileSize();
+    const openvdb::FloatGrid::Ptr grid = emptyGrid();
+    openvdb::FloatGrid::Accessor voxels = grid->getAccessor();
+    const auto count = static_cast<double>(ranks_.size());
+    const ZRange layers = intersection(core, {0, size.z()});
+    for (int z = layers.begin; z < layers.end; ++z) {
+      const std::uint32_t* rank = ranks_.data() + static_cast<std::size_t>(z) * size.y() * size.x();
+      for (int y = 0; y < size.y(); ++y) {
+        for (int x = 0; x < size.x(); ++x)
+          voxels.setValue(Coord(x, y, z), static_cast<float>((*rank++ + 0.5) / count));
+      }
+    }
+    return {{"mask", grid}};
+  }
+
+ private:
+  [[nodiscard]] Coord tileSize() const { return Coord::floor(size_); }
+
+  [[nodiscard]] openvdb::FloatGrid::Ptr emptyGrid() const {
+    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0.0f);
+    grid->setName("mask");
+    grid->insertMeta("mask:size", openvdb::Vec3IMetadata(tileSize().asVec3i()));
+    grid->insertMeta("mask:kind", openvdb::StringMetadata(kind_));
+    if (kind_ != "bayer") grid->insertMeta("mask:seed", openvdb::Int32Metadata(seed_));
+    if (kind_ == "void-and-cluster") {
+      grid->insertMeta("mask:kernel", openvdb::StringMetadata(kernel_));
+      grid->insertMeta("mask:sigma", openvdb::Vec3DMetadata(sigma_));
+      if (kernel_ == "axis-mix") {
+        grid->insertMeta("mask:plane_sigma", openvdb::DoubleMetadata(plane_sigma_));
+        grid->insertMeta("mask:space_weight", openvdb::DoubleMetadata(space_weight_));
+      }
+    }
+    return grid;
+  }
+
+  [[nodiscard]] std::vector<std::uint32_t> makeRanks() const {
+    const Coord size = tileSize();
+    if (kind_ == "bayer") return bayerRanks(size);
+    if (kind_ == "white") return randomPermutation(size.x() * size.y() * size.z(), seed_);
+    VoidAndCluster settings;
+    settings.size = size;
+    settings.kernel.shape = kernel_ == "peters"  ? MaskKernel::Shape::peters
+                            : kernel_ == "gauss" ? MaskKernel::Shape::gauss
+                                                 : MaskKernel::Shape::axis_mix;
+    settings.kernel.sigma = sigma_;
+    settings.kernel.plane_sigma = plane_sigma_;
+    settings.kernel.space_weight = space_weight_;
+    settings.seed = seed_;
+    return voidAndCluster(settings, [this](double fraction) { report().progress(fraction); });
+  }
+
+  openvdb::Vec3d size_{128, 128, 128};
+  std::string kind_ = "void-and-cluster";
+  std::string kernel_ = "peters";
+  openvdb::Vec3d sigma_{1.1, 1.1, 1.1};
+  double plane_sigma_ = 2.1;
+  double space_weight_ = 10;
+  int seed_ = 1;
+  mutable std::once_flag made_;
+  mutable std::vector<std::uint32_t> ranks_;
+};
+
+}  // namespace
+
+extern const OperatorInfo mask{
+    "mask", "Makes a periodic tile of dither thresholds", "mask --size 16 --sigma 1.1 -o mask.vdb",
+    []() -> std::unique_ptr<Operator> { return std::make_unique<Mask>(); }};
+
+}  // namespace vdbdither
