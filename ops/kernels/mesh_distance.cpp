@@ -462,6 +462,12 @@ MeshDistance::MeshDistance(std::shared_ptr<const Mesh> mesh, const Lattice& latt
       extras_(extras),
       features_(*mesh_, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers) {}
 
+double MeshDistance::memoryBytes() const {
+  return static_cast<double>(mesh_->vertices.size() * sizeof(Vec3d) +
+                             mesh_->triangles.size() * sizeof(Mesh::Triangle)) +
+         features_.memoryBytes();
+}
+
 DistanceGrids MeshDistance::run(ZRange core) const {
   DistanceGrids grids;
   const auto dress = [&](auto grid, const char* name, openvdb::GridClass grid_class) {

@@ -65,6 +65,9 @@ class MeshDistance {
 
   [[nodiscard]] double backgroundMm() const { return band_.mm; }
 
+  /// Bytes held from construction on, the mesh included.
+  [[nodiscard]] double memoryBytes() const;
+
  private:
   class Chunk;
 

@@ -91,6 +91,14 @@ MeshFeatures::MeshFeatures(const Mesh& mesh, const Vec3d& origin_mm, double laye
   sortByLayer(layer_mm);
 }
 
+double MeshFeatures::memoryBytes() const {
+  const auto bytes = [](const auto& vector) {
+    return static_cast<double>(vector.capacity() * sizeof(vector[0]));
+  };
+  return bytes(positions_) + bytes(normals_) + bytes(edges_) + bytes(half_edges_) +
+         bytes(first_edge_) + bytes(vertex_edges_) + bytes(order_) + bytes(blocks_);
+}
+
 void MeshFeatures::findNormals() {
   normals_.resize(mesh_.triangles.size());
   tbb::parallel_for(std::size_t{0}, normals_.size(), [this](std::size_t i) {

@@ -57,6 +57,7 @@ class MeshFeatures {
   /// the height of the bins that the order is made by.
   MeshFeatures(const Mesh& mesh, const openvdb::Vec3d& origin_mm, double layer_mm);
 
+  [[nodiscard]] double memoryBytes() const;
   [[nodiscard]] std::size_t size() const { return order_.size(); }
   [[nodiscard]] Id id(std::size_t position) const { return order_[position]; }
 
