@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <openvdb/math/Vec3.h>
+#include <openvdb/Types.h>
 
 namespace vdbdither {
 

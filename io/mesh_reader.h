@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "vdbdither/mesh.h"
+
+namespace vdbdither {
+
+/// Reads a triangle mesh from an STL (binary or ASCII), OBJ or PLY (ASCII or binary) file. The
+/// content decides which it is, not the name.
+///
+/// Guarantees: at least one triangle, finite positions, indices in range, no vertex without a
+/// triangle, vertices in the order of their first appearance in the file. Corners of an STL at
+/// exactly the same position (−0 equals +0) share one vertex; OBJ and PLY keep the vertices of the
+/// file. Polygons come back as triangles that cover them, also when they are concave.
+///
+/// @param path  a regular file, which must not shrink while it is read
+/// @param warn  told, one line each, of what was odd and yet read; may be empty
+/// @throws DataError for everything else: what is wrong, on which line or byte, and what to do
+Mesh readMesh(const std::filesystem::path& path,
+              const std::function<void(const std::string&)>& warn);
+
+}  // namespace vdbdither

@@ -1,0 +1,114 @@
+// Wavefront OBJ: its vertices and polygonal faces, as in appendix B1 of the Advanced Visualizer
+// manual (Wavefront Technologies, 1995).
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "io/mesh_formats.h"
+#include "io/polygon.h"
+#include "io/text_cursor.h"
+
+namespace vdbdither {
+
+using openvdb::Vec3d;
+
+namespace {
+
+/// Statements whose argument is a name: a backslash at its end is part of it.
+constexpr std::array<std::string_view, 4> naming{"g", "mtllib", "o", "usemtl"};
+
+/// Statements that say nothing of the polygons' shape.
+constexpr std::array<std::string_view, 13> immaterial{
+    "bevel",      "c_interp",  "d_interp", "l",  "lod", "p", "s",
+    "shadow_obj", "trace_obj", "usemap",   "vn", "vp",  "vt"};
+
+template <class Words>
+bool contains(const Words& words, std::string_view word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+Vec3d parseVertex(const MeshFile& file, const char* line, TextCursor& text) {
+  const auto x = text.number();
+  const auto y = x ? text.number() : x;
+  const auto z = y ? text.number() : y;
+  if (!z) {
+    const std::string_view word = text.word();
+    file.refuseAtLine(line, (word.empty() ? "a vertex has fewer than 3 coordinates"
+                                          : inQuotes(word) + " is not a coordinate") +
+                                "; repair the line or export again");
+  }
+  const Vec3d position(*x, *y, *z);
+  if (!isFinite(position)) {
+    file.refuseAtLine(line, "vertex is not finite (" + shown(position) + "); repair the mesh");
+  }
+  return position;
+}
+
+/// A corner "v", "v/vt", "v//vn" or "v/vt/vn" as the index of its vertex: from 1 up, or from −1
+/// down from the latest.
+std::uint32_t parseCorner(const MeshFile& file, const char* line, std::string_view corner,
+                          std::size_t vertices) {
+  std::int64_t index = 0;
+  const char* end = corner.data() + corner.size();
+  const auto [stop, error] = std::from_chars(corner.data(), end, index);
+  if (error == std::errc::invalid_argument || (stop != end && *stop != '/')) {
+    file.refuseAtLine(line, inQuotes(corner) + " is not a face corner (v, v/vt, v//vn or v/vt/vn)" +
+                                "; repair the line or export again");
+  }
+  const auto count = static_cast<std::int64_t>(vertices);
+  const bool in_range = error == std::errc() && index != 0 && index <= count && index >= -count;
+  if (!in_range) {
+    file.refuseAtLine(line, "face corner " + inQuotes(corner) +
+                                " is out of range: " + std::to_string(vertices) +
+                                " vertices so far, counted from 1; export it again");
+  }
+  return static_cast<std::uint32_t>(index > 0 ? index - 1 : index + count);
+}
+
+}  // namespace
+
+bool looksLikeObj(std::string_view bytes) {
+  for (TextCursor text(bytes); !text.atEnd(); text.skipLine()) {
+    const std::string_view word = text.word();
+    if (word.empty() || word.starts_with('#')) continue;
+    return word == "v" || word == "f" || contains(naming, word) || contains(immaterial, word);
+  }
+  return true;
+}
+
+Mesh parseObj(const MeshFile& file) {
+  Mesh mesh;
+  PolygonCollector polygons(file, mesh);
+  std::vector<std::uint32_t> corners;
+  std::size_t ignored = 0;
+  const char* first_ignored = nullptr;
+  TextCursor text(file.bytes().substr(file.bytes().starts_with("\xEF\xBB\xBF") ? 3 : 0));
+  for (; !text.atEnd(); text.skipLine()) {
+    const char* line = text.position();
+    const std::string_view statement = text.word();
+    if (statement.empty() || statement.starts_with('#') || contains(naming, statement)) continue;
+    if (statement == "v") {
+      mesh.vertices.push_back(parseVertex(file, line, text));
+    } else if (statement == "f") {
+      corners.clear();
+      for (auto corner = text.word(); !corner.empty(); corner = text.word()) {
+        corners.push_back(parseCorner(file, line, corner, mesh.vertices.size()));
+      }
+      polygons.add(corners, line);
+    } else if (!contains(immaterial, statement) && ignored++ == 0) {
+      first_ignored = line;
+    }
+    // What is left of the line may be continued on the next.
+    while (!text.word().empty()) continue;
+  }
+  polygons.finish();
+  if (ignored > 0) {
+    file.warnAtLine(first_ignored, "ignored " + std::to_string(ignored) +
+                                       " statements that are not polygons, from here on");
+  }
+  return mesh;
+}
+
+}  // namespace vdbdither

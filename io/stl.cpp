@@ -1,0 +1,209 @@
+// STL as it is found in the wild: the binary and ASCII forms of the StereoLithography Interface
+// Specification (3D Systems, 1988), several solids to a file, headers that lie.
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include "io/mesh_formats.h"
+#include "io/text_cursor.h"
+
+namespace vdbdither {
+
+using openvdb::Vec3d;
+
+namespace {
+
+constexpr std::size_t header_size = 84;
+constexpr std::size_t facet_size = 50;
+constexpr std::size_t normal_size = 12;
+
+std::uint32_t littleEndian32(const char* at) {
+  std::uint32_t value = 0;
+  for (int byte = 3; byte >= 0; --byte) {
+    value = value << 8 | static_cast<unsigned char>(at[byte]);
+  }
+  return value;
+}
+
+double littleEndianFloat(const char* at) { return std::bit_cast<float>(littleEndian32(at)); }
+
+/// Gives corners at the same position one vertex, in the order of first appearance. An
+/// open-addressing table of (hash, vertex), at most half full.
+class Welder {
+ public:
+  explicit Welder(const MeshFile& file) : file_(file), slots_(1024) {}
+
+  void reserve(std::size_t triangles) { mesh_.triangles.reserve(triangles); }
+
+  void addTriangle(const std::array<Vec3d, 3>& corners) {
+    mesh_.triangles.push_back({vertexAt(corners[0]), vertexAt(corners[1]), vertexAt(corners[2])});
+  }
+
+  Mesh take() { return std::move(mesh_); }
+
+ private:
+  static constexpr auto none = std::numeric_limits<std::uint32_t>::max();
+  struct Slot {
+    std::uint32_t hash = 0;
+    std::uint32_t vertex = none;
+  };
+
+  static std::uint32_t hashOf(const Vec3d& position) {
+    std::uint64_t hash = std::bit_cast<std::uint64_t>(position.x()) * 0x9E3779B97F4A7C15 +
+                         std::bit_cast<std::uint64_t>(position.y()) * 0xC2B2AE3D27D4EB4F +
+                         std::bit_cast<std::uint64_t>(position.z()) * 0x165667B19E3779F9;
+    hash ^= hash >> 32;
+    hash *= 0xD6E8FEB86659FD93;
+    return static_cast<std::uint32_t>(hash >> 32);
+  }
+
+  std::uint32_t vertexAt(Vec3d position) {
+    position += Vec3d(0.0);  // −0 becomes +0
+    const std::uint32_t hash = hashOf(position);
+    std::size_t at = hash & (slots_.size() - 1);
+    for (; slots_[at].vertex != none; at = (at + 1) & (slots_.size() - 1)) {
+      if (slots_[at].hash == hash && mesh_.vertices[slots_[at].vertex] == position) {
+        return slots_[at].vertex;
+      }
+    }
+    if (mesh_.vertices.size() == none)
+      file_.refuse("more than 4294967295 vertices; split the part");
+    const auto vertex = static_cast<std::uint32_t>(mesh_.vertices.size());
+    slots_[at] = {hash, vertex};
+    mesh_.vertices.push_back(position);
+    if (mesh_.vertices.size() * 2 > slots_.size()) grow();
+    return vertex;
+  }
+
+  void grow() {
+    std::vector<Slot> larger(slots_.size() * 2);
+    for (const Slot& slot : slots_) {
+      if (slot.vertex == none) continue;
+      std::size_t at = slot.hash & (larger.size() - 1);
+      while (larger[at].vertex != none) at = (at + 1) & (larger.size() - 1);
+      larger[at] = slot;
+    }
+    slots_.swap(larger);
+  }
+
+  const MeshFile& file_;
+  std::vector<Slot> slots_;
+  Mesh mesh_;
+};
+
+/// How many triangles to read: what the size holds, as long as the header does not promise more.
+std::size_t countFacets(const MeshFile& file) {
+  const std::string_view bytes = file.bytes();
+  if (bytes.size() < header_size) {
+    file.refuse("cut off: a binary STL has at least 84 bytes, this one has " +
+                std::to_string(bytes.size()) + "; export it again");
+  }
+  const std::size_t announced = littleEndian32(bytes.data() + header_size - 4);
+  const std::size_t held = (bytes.size() - header_size) / facet_size;
+  const std::size_t rest = (bytes.size() - header_size) % facet_size;
+  // Writers that cannot go back to fill in the count leave one of these.
+  const bool placeholder = announced == 0 || announced == 0xFFFFFFFF;
+  if (announced > held && !(placeholder && rest == 0)) {
+    file.refuseAtByte(bytes.data() + bytes.size(),
+                      "cut off: the header announces " + std::to_string(announced) +
+                          " triangles, the file holds " + std::to_string(held) +
+                          "; export or download it again");
+  }
+  if (rest == 0 && announced != held) {
+    file.warn("the header announces " + std::to_string(announced) + " triangles, the file holds " +
+              std::to_string(held) + ": read all of them");
+    return held;
+  }
+  if (rest != 0) {
+    file.warn("ignored " + std::to_string(bytes.size() - header_size - announced * facet_size) +
+              " bytes after the last triangle");
+  }
+  return announced;
+}
+
+}  // namespace
+
+bool hasSizeOfBinaryStl(std::string_view bytes) {
+  return bytes.size() >= header_size &&
+         bytes.size() - header_size == littleEndian32(bytes.data() + header_size - 4) * facet_size;
+}
+
+Mesh parseBinaryStl(const MeshFile& file) {
+  const std::size_t count = countFacets(file);
+  Welder welder(file);
+  welder.reserve(count);
+  const char* facet = file.bytes().data() + header_size;
+  for (std::size_t triangle = 0; triangle < count; ++triangle, facet += facet_size) {
+    std::array<Vec3d, 3> corners;
+    const char* at = facet + normal_size;
+    for (Vec3d& corner : corners) {
+      corner = {littleEndianFloat(at), littleEndianFloat(at + 4), littleEndianFloat(at + 8)};
+      if (!isFinite(corner)) {
+        file.refuseAtByte(at, "triangle " + std::to_string(triangle + 1) +
+                                  " has a corner that is not finite (" + shown(corner) +
+                                  "); repair the mesh");
+      }
+      at += 12;
+    }
+    welder.addTriangle(corners);
+  }
+  return welder.take();
+}
+
+Mesh parseAsciiStl(const MeshFile& file) {
+  Welder welder(file);
+  TextCursor text(file.bytes().substr(file.bytes().starts_with("\xEF\xBB\xBF") ? 3 : 0));
+  std::array<Vec3d, 3> corners;
+  std::size_t corner_count = 0;
+  bool in_loop = false;
+  bool in_solid = false;
+  for (; !text.atEnd(); text.skipLine()) {
+    const char* line = text.position();
+    const std::string_view keyword = text.word();
+    if (keyword.empty()) continue;
+    if (equalsIgnoringCase(keyword, "vertex")) {
+      const auto x = text.number();
+      const auto y = x ? text.number() : x;
+      const auto z = y ? text.number() : y;
+      if (!z || !text.word().empty()) {
+        file.refuseAtLine(line, "a vertex is not three numbers; repair the line or export again");
+      }
+      const Vec3d corner(*x, *y, *z);
+      if (!isFinite(corner)) {
+        file.refuseAtLine(line, "vertex is not finite (" + shown(corner) + "); repair the mesh");
+      }
+      if (!in_loop) file.refuseAtLine(line, "vertex outside of a loop; export it again");
+      if (corner_count < 3) corners[corner_count] = corner;
+      ++corner_count;
+    } else if (equalsIgnoringCase(keyword, "facet") || equalsIgnoringCase(keyword, "endfacet")) {
+      if (in_loop) file.refuseAtLine(line, "the loop before is not closed; export it again");
+    } else if (equalsIgnoringCase(keyword, "outer")) {
+      if (in_loop) file.refuseAtLine(line, "the loop before is not closed; export it again");
+      in_loop = true;
+      corner_count = 0;
+    } else if (equalsIgnoringCase(keyword, "endloop")) {
+      if (!in_loop || corner_count != 3) {
+        file.refuseAtLine(line, "a facet has " + std::to_string(corner_count) +
+                                    " corners instead of 3; export triangles only");
+      }
+      welder.addTriangle(corners);
+      in_loop = false;
+    } else if (equalsIgnoringCase(keyword, "solid")) {
+      in_solid = true;
+    } else if (equalsIgnoringCase(keyword, "endsolid")) {
+      in_solid = false;
+    } else {
+      file.refuseAtLine(
+          line, inQuotes(keyword) + " is no keyword of STL; repair the line or export again");
+    }
+  }
+  if (in_solid || in_loop) {
+    file.refuseAtLine(text.position(),
+                      "cut off: the file ends without 'endsolid'; export or download it again");
+  }
+  return welder.take();
+}
+
+}  // namespace vdbdither

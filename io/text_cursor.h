@@ -1,0 +1,115 @@
+#pragma once
+
+#include <charconv>
+#include <limits>
+#include <optional>
+#include <string_view>
+#include <system_error>
+
+namespace vdbdither {
+
+/// Walks through a text by lines, words and numbers. "\n", "\r" and "\r\n" end a line; a backslash
+/// before the end of a line continues it.
+class TextCursor {
+ public:
+  explicit TextCursor(std::string_view text) : at_(text.data()), end_(text.data() + text.size()) {}
+
+  [[nodiscard]] const char* position() const { return at_; }
+  [[nodiscard]] bool atEnd() const { return at_ == end_; }
+  [[nodiscard]] bool atLineEnd() const { return endsLine(at_); }
+
+  void skipBlanks() {
+    for (;;) {
+      if (at_ != end_ && (*at_ == ' ' || *at_ == '\t' || *at_ == '\v' || *at_ == '\f')) {
+        ++at_;
+      } else if (continuesLine(at_)) {
+        ++at_;
+        skipLineEnd();
+      } else {
+        return;
+      }
+    }
+  }
+
+  /// To the next word, over ends of lines.
+  void skipSpace() {
+    for (skipBlanks(); !atEnd() && atLineEnd(); skipBlanks()) ++at_;
+  }
+
+  /// To the start of the next line; backslashes do not continue this one.
+  void skipLine() {
+    while (!atLineEnd()) ++at_;
+    skipLineEnd();
+  }
+
+  /// The rest of the line.
+  std::string_view line() {
+    const char* begin = at_;
+    while (!atLineEnd()) ++at_;
+    return {begin, at_};
+  }
+
+  /// The next word of this line, empty at its end.
+  std::string_view word() {
+    skipBlanks();
+    const char* begin = at_;
+    while (!endsWord(at_)) ++at_;
+    return {begin, at_};
+  }
+
+  /// The next word of this line if it is a number, also "inf" or "nan"; else the cursor stays
+  /// before it.
+  std::optional<double> number() {
+    skipBlanks();
+    const char* begin = at_;
+    if (end_ - begin > 1 && begin[0] == '+' && begin[1] != '-') ++begin;
+    double value = 0;
+    auto [stop, error] = std::from_chars(begin, end_, value);
+    if (error == std::errc::invalid_argument || !endsWord(stop)) return std::nullopt;
+    if (error == std::errc::result_out_of_range) value = extreme(begin, stop);
+    at_ = stop;
+    return value;
+  }
+
+ private:
+  [[nodiscard]] bool endsLine(const char* at) const {
+    return at == end_ || *at == '\n' || *at == '\r';
+  }
+  [[nodiscard]] bool continuesLine(const char* at) const {
+    return at != end_ && *at == '\\' && at + 1 != end_ && endsLine(at + 1);
+  }
+  [[nodiscard]] bool endsWord(const char* at) const {
+    return endsLine(at) || *at == ' ' || *at == '\t' || *at == '\v' || *at == '\f' ||
+           continuesLine(at);
+  }
+  void skipLineEnd() {
+    if (at_ != end_ && *at_ == '\r') {
+      ++at_;
+      if (at_ != end_ && *at_ == '\n') ++at_;
+    } else if (at_ != end_) {
+      ++at_;
+    }
+  }
+
+  /// A number beyond the range of double is zero or infinite; from_chars does not say which.
+  static double extreme(const char* begin, const char* end) {
+    long double value = std::numeric_limits<long double>::infinity();
+    std::from_chars(begin, end, value);
+    return static_cast<double>(value);
+  }
+
+  const char* at_;
+  const char* end_;
+};
+
+/// Whether two ASCII words are equal but for upper and lower case; `lower` is lower case.
+inline bool equalsIgnoringCase(std::string_view word, std::string_view lower) {
+  if (word.size() != lower.size()) return false;
+  for (std::size_t i = 0; i < word.size(); ++i) {
+    const char c = word[i];
+    if ((c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c) != lower[i]) return false;
+  }
+  return true;
+}
+
+}  // namespace vdbdither

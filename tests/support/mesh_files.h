@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "vdbdither/mesh.h"
+
+namespace vdbdither::test {
+
+/// The bytes of a mesh in each of the formats that are read. Normals are left at zero.
+std::string binaryStl(const Mesh& mesh, std::string_view header = "binary STL");
+std::string asciiStl(const Mesh& mesh, std::string_view newline = "\n");
+std::string objText(const Mesh& mesh, std::string_view newline = "\n");
+
+enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
+
+/// @param coordinate  type of the coordinates, "float" or "double"
+/// @param index       type of the indices, "int" or "uint16"
+std::string plyFile(const Mesh& mesh, PlyEncoding encoding, std::string_view coordinate = "float",
+                    std::string_view index = "int");
+
+}  // namespace vdbdither::test
