@@ -6,6 +6,8 @@
 #include "io/mesh_reader.h"
 #include "io/printer_profile.h"
 #include "ops/kernels/mesh_distance.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {
@@ -78,7 +80,8 @@ class MeshToSdf : public Source {
     options.flag("place", place_,
                  "Puts the mesh on the bed: its bounding box begins at the origin");
     options.integer("refine-y", refine_y_, 1, 16, "Voxels in place of one along y");
-    options.length("band", band_mm_, "How far from the surface distances are kept; 0: two voxel diagonals");
+    options.length("band", band_mm_,
+                   "How far from the surface distances are kept; 0: two voxel diagonals");
     options.flag("normals", extras_.normals, "Adds the grid 'N', exact unit outward normals");
     options.flag("closest", extras_.closest,
                  "Adds the grid 'closest', the index of the nearest triangle");
@@ -151,7 +154,8 @@ class MeshToSdf : public Source {
     for (Vec3d& vertex : mesh.vertices) vertex -= corner;
   }
 
-  /// The voxels within a voxel diagonal of the mesh's bounding box; where y is refined, the same region in finer voxels.
+  /// The voxels within a voxel diagonal of the mesh's bounding box; where y is refined, the same
+  /// region in finer voxels.
   Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm) const {
     const Bounds bounds = boundsOf(mesh);
     const double margin_mm = pitch_mm.length();
@@ -159,8 +163,9 @@ class MeshToSdf : public Source {
       const double furthest_mm =
           std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) + margin_mm;
       if (!(furthest_mm / pitch_mm[axis] * refine_y_ < 1e8))
-        throw DataError("the mesh reaches " + shortestText(furthest_mm) +
-                        " mm from the origin, more voxels than can be counted; check --unit and --scale");
+        throw DataError(
+            "the mesh reaches " + shortestText(furthest_mm) +
+            " mm from the origin, more voxels than can be counted; check --unit and --scale");
     }
     Lattice lattice{pitch_mm, Vec3d(0, 0, 0),
                     CoordBBox(Coord::floor((bounds.min - margin_mm) / pitch_mm),
@@ -175,7 +180,8 @@ class MeshToSdf : public Source {
     return lattice;
   }
 
-  /// Every leaf that the band meets, spread by the area of the surface over the rows that it crosses.
+  /// Every leaf that the band meets, spread by the area of the surface over the rows that it
+  /// crosses.
   double leavesPerRow(const Mesh& mesh, const Lattice& lattice) const {
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
     const auto rows = static_cast<std::size_t>(lattice.layers().size() / leaf_layers + 2);
@@ -186,15 +192,16 @@ class MeshToSdf : public Source {
       const Vec3d& b = mesh.vertices[t[1]];
       const Vec3d& c = mesh.vertices[t[2]];
       const Vec3d area = 0.5 * (b - a).cross(c - a);
-      // The region within the band of the triangle, widened by the leaf's own extent along its normal.
+      // The region within the band of the triangle, widened by the leaf's own extent along its
+      // normal.
       const double across = std::abs(area.x()) * leaf_mm.x() + std::abs(area.y()) * leaf_mm.y() +
                             std::abs(area.z()) * leaf_mm.z();
       const double touched = (2 * band_.mm * area.length() + across) / leaf_mm.product();
       const auto [z_low, z_high] = std::minmax({a.z(), b.z(), c.z()});
-      const auto first = static_cast<std::size_t>(std::clamp(
-          (z_low - band_.mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
-      const auto last = static_cast<std::size_t>(std::clamp(
-          (z_high + band_.mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
+      const auto first = static_cast<std::size_t>(
+          std::clamp((z_low - band_.mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
+      const auto last = static_cast<std::size_t>(
+          std::clamp((z_high + band_.mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
       for (std::size_t row = first; row <= last; ++row)
         leaves[row] += touched / static_cast<double>(last - first + 1);
     }
@@ -227,9 +234,9 @@ class MeshToSdf : public Source {
 }  // namespace
 
 extern const OperatorInfo mesh2sdf;
-const OperatorInfo mesh2sdf{"mesh2sdf",
-                            "Signed distance in mm from triangle meshes, on the printer's lattice",
-                            "mesh2sdf part.stl --printer mimaki-3duj-553 -o surface.vdb",
-                            []() -> std::unique_ptr<Operator> { return std::make_unique<MeshToSdf>(); }};
+const OperatorInfo mesh2sdf{
+    "mesh2sdf", "Signed distance in mm from triangle meshes, on the printer's lattice",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 -o surface.vdb",
+    []() -> std::unique_ptr<Operator> { return std::make_unique<MeshToSdf>(); }};
 
 }  // namespace vdbdither

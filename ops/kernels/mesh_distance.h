@@ -2,11 +2,10 @@
 
 #include <memory>
 
-#include <openvdb/openvdb.h>
-
 #include "ops/kernels/mesh_features.h"
 #include "vdbdither/lattice.h"
 #include "vdbdither/mesh.h"
+#include "vdbdither/openvdb.h"
 
 namespace vdbdither {
 
