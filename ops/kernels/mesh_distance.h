@@ -1,0 +1,80 @@
+#pragma once
+
+#include <memory>
+
+#include "ops/kernels/mesh_features.h"
+#include "vdbdither/lattice.h"
+#include "vdbdither/mesh.h"
+#include "vdbdither/openvdb.h"
+
+namespace vdbdither {
+
+/// How far from the surface distances are kept.
+struct Band {
+  double mm = 0;
+};
+
+/// What is kept besides the distance; none of it costs a second search.
+struct DistanceExtras {
+  bool normals = false;  ///< `N`: the unit outward normal, from the nearest point of the surface
+  bool closest = false;  ///< the index of the nearest triangle; the lowest that shares the
+                         ///< nearest edge or vertex
+};
+
+/// The grids over a range of layers; those that were not asked for are null.
+struct DistanceGrids {
+  openvdb::FloatGrid::Ptr surface;
+  openvdb::Vec3SGrid::Ptr normals;
+  openvdb::Int32Grid::Ptr closest;
+};
+
+/// Signed distance from a mesh, exact in millimetres on any lattice, made slab by slab.
+///
+/// Guarantees, for every voxel of the lattice's box:
+/// - it is active in `surface` where its distance is below the band, and holds that distance to the
+/// precision of a
+///   float, negative inside; elsewhere it is inactive and holds ±background, which is the band in
+///   mm;
+/// - inside is where the winding number along the row of voxels (x) is not zero, counted by rules
+/// that agree to the bit
+///   between neighbouring triangles: right on every closed mesh, with cavities and parts in any
+///   orientation;
+/// - the bits depend on the mesh, the lattice and the band alone: not on how the layers are cut
+/// into runs, on threads
+///   or on the instruction set. The tree is in canonical form: no leaf without an active voxel or a
+///   change of sign, the interior as tiles.
+///
+/// Memory beyond the mesh is bounded by the layers of one run, and by `chunk_layers` where the run
+/// is higher.
+class MeshDistance {
+ public:
+  static constexpr int chunk_layers = 4 * leaf_layers;
+
+  /// `mesh` in mm. Positions are those of the lattice.
+  MeshDistance(std::shared_ptr<const Mesh> mesh, const Lattice& lattice, Band band,
+               DistanceExtras extras = {});
+
+  /// The layers of `core`, clipped to the lattice's box. Const, in any order, from many threads at
+  /// once.
+  ///
+  /// `N` is the direction from the nearest point to the voxel's centre, outwards; closer than 1e-6
+  /// mm to the surface, where that says nothing, the normal of the nearest triangle (the lowest
+  /// where an edge or a vertex is nearest).
+  [[nodiscard]] DistanceGrids run(ZRange core) const;
+
+  [[nodiscard]] double backgroundMm() const { return band_.mm; }
+
+  /// Bytes held from construction on, the mesh included.
+  [[nodiscard]] double memoryBytes() const;
+
+ private:
+  class Chunk;
+
+  std::shared_ptr<const Mesh> mesh_;
+  Lattice lattice_;
+  Band band_;
+  DistanceExtras extras_;
+  MeshFeatures features_;
+};
+
+}  // namespace vdbdither

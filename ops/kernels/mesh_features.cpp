@@ -1,0 +1,340 @@
+// Distance by characteristic regions: every point of space has its nearest point of the mesh on a
+// face whose prism holds it, on an edge whose wedge holds it, or on a vertex whose cone holds it
+// (S. Mauch, "A fast algorithm for computing the closest point and distance transform", Caltech
+// 2000). The regions used here are the intersections of half-spaces that the first-order condition
+// gives for any set of triangles, so they are right for open and non-manifold meshes too: a wedge
+// lies beyond every face of its edge, a cone beyond every edge of its vertex.
+
+#include "ops/kernels/mesh_features.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+namespace vdbdither {
+
+using openvdb::Vec3d;
+
+namespace {
+
+/// How far regions reach over their borders, mm: far above the rounding at 1 m, far below what a
+/// distance may err.
+constexpr double slack_mm = 1e-9;
+
+/// Triangles lower than this are told by their edges alone.
+constexpr double least_height_mm = 1e-7;
+
+constexpr std::size_t block_size = 256;
+
+double manhattanLength(const Vec3d& v) {
+  return std::abs(v.x()) + std::abs(v.y()) + std::abs(v.z());
+}
+
+LinearForm formThrough(const Vec3d& gradient, const Vec3d& point) {
+  return {gradient, -gradient.dot(point)};
+}
+
+/// The half-space `gradient` points into from `point`, a little widened.
+LinearForm halfSpace(const Vec3d& gradient, const Vec3d& point) {
+  return {gradient, slack_mm * manhattanLength(gradient) - gradient.dot(point)};
+}
+
+/// Unit normal from the longest side and the height on it, which stays accurate for slivers.
+Vec3d faceNormal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+  std::array<Vec3d, 3> corners{a, b, c};
+  const std::array<double, 3> lengths{(b - a).lengthSqr(), (c - b).lengthSqr(),
+                                      (a - c).lengthSqr()};
+  std::rotate(
+      corners.begin(),
+      corners.begin() + (std::max_element(lengths.begin(), lengths.end()) - lengths.begin()),
+      corners.end());
+  const Vec3d side = corners[1] - corners[0];
+  const double length = side.length();
+  if (!(length > least_height_mm)) return {0, 0, 0};
+  const Vec3d along = side / length;
+  const Vec3d over = corners[2] - corners[0];
+  const Vec3d height = over - along * over.dot(along);
+  const double rise = height.length();
+  if (!(rise > least_height_mm)) return {0, 0, 0};
+  return along.cross(height / rise);
+}
+
+Vec3d anyPerpendicular(const Vec3d& unit) {
+  const Vec3d other = std::abs(unit.x()) < 0.6 ? Vec3d(1, 0, 0) : Vec3d(0, 1, 0);
+  const Vec3d across = unit.cross(other);
+  return across / across.length();
+}
+
+Vec3d componentMin(const Vec3d& a, const Vec3d& b) { return openvdb::math::minComponent(a, b); }
+Vec3d componentMax(const Vec3d& a, const Vec3d& b) { return openvdb::math::maxComponent(a, b); }
+
+/// How far the directions between the unit vectors `a` and `b` reach along +x, +y and +z.
+Vec3d arcReach(const Vec3d& a, const Vec3d& b) {
+  const double cosine = a.dot(b);
+  if (cosine < 0.1) return {1, 1, 1};
+  const Vec3d tip = (a + b) / (1 + cosine);
+  return componentMax(componentMax(a, b), componentMax(tip, Vec3d(0, 0, 0)));
+}
+
+}  // namespace
+
+MeshFeatures::MeshFeatures(const Mesh& mesh, const Vec3d& origin_mm, double layer_mm)
+    : mesh_(mesh) {
+  positions_.reserve(mesh.vertices.size());
+  for (const Vec3d& vertex : mesh.vertices) positions_.push_back(vertex - origin_mm);
+  findNormals();
+  findEdges();
+  findNeighbours();
+  sortByLayer(layer_mm);
+}
+
+double MeshFeatures::memoryBytes() const {
+  const auto bytes = [](const auto& vector) {
+    return static_cast<double>(vector.capacity() * sizeof(vector[0]));
+  };
+  return bytes(positions_) + bytes(normals_) + bytes(edges_) + bytes(half_edges_) +
+         bytes(first_edge_) + bytes(vertex_edges_) + bytes(order_) + bytes(blocks_);
+}
+
+void MeshFeatures::findNormals() {
+  normals_.resize(mesh_.triangles.size());
+  tbb::parallel_for(std::size_t{0}, normals_.size(), [this](std::size_t i) {
+    const auto t = static_cast<std::uint32_t>(i);
+    normals_[i] = faceNormal(corner(t, 0), corner(t, 1), corner(t, 2));
+  });
+}
+
+void MeshFeatures::findEdges() {
+  struct HalfEdge {
+    std::uint32_t to, half;
+  };
+  const auto ends = [this](std::size_t half) {
+    const Mesh::Triangle& t = mesh_.triangles[half / 3];
+    return std::minmax({t[half % 3], t[(half + 1) % 3]});
+  };
+  const std::size_t halves = 3 * mesh_.triangles.size();
+  std::vector<std::uint32_t> first(positions_.size() + 1, 0);
+  for (std::size_t half = 0; half < halves; ++half) {
+    const auto [from, to] = ends(half);
+    if (from != to) ++first[from + 1];
+  }
+  for (std::size_t v = 0; v < positions_.size(); ++v) first[v + 1] += first[v];
+  std::vector<HalfEdge> sorted(first.back());
+  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+  for (std::size_t half = 0; half < halves; ++half) {
+    const auto [from, to] = ends(half);
+    if (from != to) sorted[next[from]++] = {to, static_cast<std::uint32_t>(half)};
+  }
+  half_edges_.reserve(sorted.size());
+  edges_.reserve(sorted.size() / 2 + 1);
+  for (std::uint32_t from = 0; from < positions_.size(); ++from) {
+    const auto begin = sorted.begin() + first[from];
+    const auto end = sorted.begin() + first[from + 1];
+    std::sort(begin, end, [](const HalfEdge& a, const HalfEdge& b) {
+      return std::pair(a.to, a.half) < std::pair(b.to, b.half);
+    });
+    for (auto it = begin; it != end; ++it) {
+      if (it == begin || it->to != std::prev(it)->to)
+        edges_.push_back({from, it->to, static_cast<std::uint32_t>(half_edges_.size())});
+      half_edges_.push_back(it->half);
+    }
+  }
+  edges_.push_back({0, 0, static_cast<std::uint32_t>(half_edges_.size())});
+}
+
+void MeshFeatures::findNeighbours() {
+  first_edge_.assign(positions_.size() + 1, 0);
+  const auto count = static_cast<std::uint32_t>(edges_.size() - 1);
+  for (std::uint32_t e = 0; e < count; ++e) {
+    ++first_edge_[edges_[e].from + 1];
+    ++first_edge_[edges_[e].to + 1];
+  }
+  for (std::size_t v = 0; v < positions_.size(); ++v) first_edge_[v + 1] += first_edge_[v];
+  vertex_edges_.resize(first_edge_.back());
+  std::vector<std::uint32_t> next(first_edge_.begin(), first_edge_.end() - 1);
+  for (std::uint32_t e = 0; e < count; ++e) {
+    vertex_edges_[next[edges_[e].from]++] = e;
+    vertex_edges_[next[edges_[e].to]++] = e;
+  }
+}
+
+MeshFeatures::Extent MeshFeatures::extent(Id id) const {
+  const auto of = [this](std::initializer_list<std::uint32_t> vertices) {
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (const std::uint32_t v : vertices) {
+      low = std::min(low, positions_[v].z());
+      high = std::max(high, positions_[v].z());
+    }
+    return Extent{std::nextafter(static_cast<float>(low), -std::numeric_limits<float>::infinity()),
+                  std::nextafter(static_cast<float>(high), std::numeric_limits<float>::infinity())};
+  };
+  switch (id.kind()) {
+    case Kind::face: {
+      const Mesh::Triangle& t = mesh_.triangles[id.index()];
+      return of({t[0], t[1], t[2]});
+    }
+    case Kind::edge:
+      return of({edges_[id.index()].from, edges_[id.index()].to});
+    case Kind::vertex:
+      return of({id.index()});
+  }
+  return {0, 0};
+}
+
+void MeshFeatures::sortByLayer(double layer_mm) {
+  std::vector<Id> all;
+  all.reserve(mesh_.triangles.size() + edges_.size() + positions_.size());
+  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) all.emplace_back(Kind::face, t);
+  for (std::uint32_t e = 0; e + 1 < edges_.size(); ++e) all.emplace_back(Kind::edge, e);
+  for (std::uint32_t v = 0; v < positions_.size(); ++v)
+    if (first_edge_[v] < first_edge_[v + 1]) all.emplace_back(Kind::vertex, v);
+  if (all.empty()) return;
+
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const Vec3d& p : positions_) {
+    low = std::min(low, p.z());
+    high = std::max(high, p.z());
+  }
+  const double bin_mm = std::max(layer_mm, (high - low) / 1e6);
+  const auto bin = [&](Id id) {
+    return static_cast<std::size_t>(std::max(0.0, (extent(id).low - low) / bin_mm));
+  };
+  std::vector<std::uint32_t> first(static_cast<std::size_t>((high - low) / bin_mm) + 2, 0);
+  for (const Id id : all) ++first[bin(id) + 1];
+  for (std::size_t b = 1; b < first.size(); ++b) first[b] += first[b - 1];
+  order_.resize(all.size());
+  for (const Id id : all) order_[first[bin(id)]++] = id;
+
+  for (std::size_t begin = 0; begin < order_.size(); begin += block_size) {
+    Extent block = extent(order_[begin]);
+    for (std::size_t i = begin; i < std::min(begin + block_size, order_.size()); ++i) {
+      const Extent one = extent(order_[i]);
+      block = {std::min(block.low, one.low), std::max(block.high, one.high)};
+    }
+    blocks_.push_back(block);
+  }
+}
+
+void MeshFeatures::collect(double low, double high, std::vector<std::uint32_t>& found) const {
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    if (blocks_[b].low > high || blocks_[b].high < low) continue;
+    const std::size_t end = std::min((b + 1) * block_size, order_.size());
+    for (std::size_t i = b * block_size; i < end; ++i) {
+      const Extent one = extent(order_[i]);
+      if (one.low <= high && one.high >= low) found.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+}
+
+MeshFeature MeshFeatures::describe(Id id) const {
+  switch (id.kind()) {
+    case Kind::face:
+      return describeFace(id.index());
+    case Kind::edge:
+      return describeEdge(id.index());
+    case Kind::vertex:
+      return describeVertex(id.index());
+  }
+  return {};
+}
+
+MeshFeature MeshFeatures::describeFace(std::uint32_t triangle) const {
+  const Vec3d& n = normals_[triangle];
+  MeshFeature face;
+  face.min =
+      componentMin(componentMin(corner(triangle, 0), corner(triangle, 1)), corner(triangle, 2));
+  face.max =
+      componentMax(componentMax(corner(triangle, 0), corner(triangle, 1)), corner(triangle, 2));
+  if (n == Vec3d(0, 0, 0)) return face;
+  face.rank = 1;
+  face.bounds = 3;
+  face.forms[0] = formThrough(n, corner(triangle, 0));
+  for (int side = 0; side < 3; ++side) {
+    const Vec3d& a = corner(triangle, side);
+    const Vec3d& b = corner(triangle, (side + 1) % 3);
+    face.forms[static_cast<std::size_t>(1 + side)] = halfSpace(n.cross(b - a), a);
+  }
+  face.below = face.above = Vec3d(std::abs(n.x()), std::abs(n.y()), std::abs(n.z()));
+  return face;
+}
+
+MeshFeature MeshFeatures::describeEdge(std::uint32_t index) const {
+  const Edge& edge = edges_[index];
+  const Vec3d& a = positions_[edge.from];
+  const Vec3d& b = positions_[edge.to];
+  MeshFeature feature;
+  feature.min = componentMin(a, b);
+  feature.max = componentMax(a, b);
+  feature.below = feature.above = Vec3d(1, 1, 1);
+  const double length = (b - a).length();
+  if (!(length > 0)) return feature;  // its two vertices stand for it
+  const Vec3d along = (b - a) / length;
+
+  feature.rank = 2;
+  feature.forms[2] = halfSpace(along, a);
+  feature.forms[3] = halfSpace(-along, b);
+  feature.bounds = 2;
+  std::array<Vec3d, 2> normals;
+  std::array<Vec3d, 2> outwards;
+  std::uint32_t faces = 0;
+  for (std::uint32_t i = edge.first; i < edges_[index + 1].first; ++i) {
+    const std::uint32_t triangle = half_edges_[i] / 3;
+    const Vec3d& n = normals_[triangle];
+    if (n == Vec3d(0, 0, 0)) continue;
+    const bool forward = mesh_.triangles[triangle][half_edges_[i] % 3] == edge.from;
+    const Vec3d outward = forward ? along.cross(n) : n.cross(along);
+    if (faces < 2) {
+      normals[faces] = n;
+      outwards[faces] = outward;
+    }
+    ++faces;
+    if (feature.bounds < MeshFeature::max_bounds)
+      feature.forms[static_cast<std::size_t>(2 + feature.bounds++)] = halfSpace(outward, a);
+  }
+  const Vec3d across = faces > 0 ? normals[0] : anyPerpendicular(along);
+  feature.forms[0] = formThrough(across, a);
+  feature.forms[1] = formThrough(along.cross(across), a);
+  if (faces == 2) {
+    const Vec3d first = outwards[1].dot(normals[0]) < 0 ? -normals[0] : normals[0];
+    const Vec3d second = outwards[0].dot(normals[1]) < 0 ? -normals[1] : normals[1];
+    feature.above = arcReach(first, second);
+    feature.below = arcReach(-first, -second);
+  }
+  return feature;
+}
+
+MeshFeature MeshFeatures::describeVertex(std::uint32_t index) const {
+  const Vec3d& p = positions_[index];
+  MeshFeature feature;
+  feature.min = feature.max = p;
+  feature.below = feature.above = Vec3d(1, 1, 1);
+  feature.rank = 3;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Vec3d unit(0, 0, 0);
+    unit[static_cast<int>(axis)] = 1;
+    feature.forms[axis] = formThrough(unit, p);
+  }
+  for (std::uint32_t i = first_edge_[index]; i < first_edge_[index + 1]; ++i) {
+    if (feature.bounds == MeshFeature::max_bounds) break;
+    const Edge& edge = edges_[vertex_edges_[i]];
+    const Vec3d& other = positions_[edge.from == index ? edge.to : edge.from];
+    feature.forms[static_cast<std::size_t>(3 + feature.bounds++)] = halfSpace(p - other, p);
+  }
+  return feature;
+}
+
+std::uint32_t MeshFeatures::triangleOf(Id id) const {
+  if (id.kind() == Kind::face) return id.index();
+  if (id.kind() == Kind::edge) return half_edges_[edges_[id.index()].first] / 3;
+  std::uint32_t lowest = std::numeric_limits<std::uint32_t>::max();
+  for (std::uint32_t i = first_edge_[id.index()]; i < first_edge_[id.index() + 1]; ++i)
+    lowest = std::min(lowest, half_edges_[edges_[vertex_edges_[i]].first] / 3);
+  return lowest;
+}
+
+}  // namespace vdbdither

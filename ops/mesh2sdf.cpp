@@ -1,0 +1,242 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "io/mesh_reader.h"
+#include "io/printer_profile.h"
+#include "ops/kernels/mesh_distance.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::Vec3d;
+
+constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{
+    {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}, {"um", 0.001}}};
+
+struct Bounds {
+  Vec3d min, max;
+};
+
+Bounds boundsOf(const Mesh& mesh) {
+  Bounds bounds{mesh.vertices.front(), mesh.vertices.front()};
+  for (const Vec3d& vertex : mesh.vertices) {
+    bounds.min = openvdb::math::minComponent(bounds.min, vertex);
+    bounds.max = openvdb::math::maxComponent(bounds.max, vertex);
+  }
+  return bounds;
+}
+
+/// `meshes` in one, one after the other.
+Mesh joined(std::vector<Mesh> meshes) {
+  Mesh all = std::move(meshes.front());
+  for (auto mesh = meshes.begin() + 1; mesh != meshes.end(); ++mesh) {
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), mesh->vertices.begin(), mesh->vertices.end());
+    for (const Mesh::Triangle& t : mesh->triangles)
+      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  return all;
+}
+
+/// Turns about the axes x, then y, then z; quarter turns are exact.
+void rotate(Mesh& mesh, const Vec3d& degrees) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double turn = std::remainder(degrees[axis], 360.0);
+    if (turn == 0) continue;
+    const bool quarters = std::fmod(turn, 90.0) == 0;
+    const double angle = turn * std::numbers::pi / 180;
+    const double cosine = quarters ? std::round(std::cos(angle)) : std::cos(angle);
+    const double sine = quarters ? std::round(std::sin(angle)) : std::sin(angle);
+    const int u = (axis + 1) % 3;
+    const int v = (axis + 2) % 3;
+    for (Vec3d& p : mesh.vertices) {
+      const double turned = cosine * p[u] - sine * p[v];
+      p[v] = sine * p[u] + cosine * p[v];
+      p[u] = turned;
+    }
+  }
+}
+
+/// `surface` from triangle meshes.
+class MeshToSdf : public Source {
+ public:
+  void declare(Options& options) override {
+    options.positionals("mesh", paths_, "Mesh files: STL, OBJ or PLY; several make one part");
+    options.text("printer", printer_, "NAME|FILE.json", "The printer whose lattice to use");
+    options.text("pitch", pitch_, "DX,DY,DZ", "The lattice's pitch, in place of a printer's");
+    options.choice("unit", unit_, {"mm", "cm", "m", "in", "um"}, "What the mesh's numbers mean");
+    options.number("scale", scale_, 1e-6, 1e6, "Scales the mesh about the origin");
+    options.length("fit", fit_mm_, "Scales the mesh until its longest axis has this length");
+    options.triple("rotate", rotate_, "X,Y,Z",
+                   "Turns the mesh about x, then y, then z, in degrees");
+    options.flag("place", place_,
+                 "Puts the mesh on the bed: its bounding box begins at the origin");
+    options.integer("refine-y", refine_y_, 1, 16, "Voxels in place of one along y");
+    options.length("band", band_mm_,
+                   "How far from the surface distances are kept; 0: two voxel diagonals");
+    options.flag("normals", extras_.normals, "Adds the grid 'N', exact unit outward normals");
+    options.flag("closest", extras_.closest,
+                 "Adds the grid 'closest', the index of the nearest triangle");
+  }
+
+  Schema plan() override {
+    Schema schema;
+    const Vec3d pitch_mm = pitchMm(schema);
+    auto mesh = std::make_shared<Mesh>(readMeshes());
+    placeMesh(*mesh);
+    schema.lattice = latticeAround(*mesh, pitch_mm);
+    band_.mm = band_mm_ > 0 ? band_mm_ : 2 * schema.lattice.diagonalMm();
+    const Lattice& lattice = schema.lattice;
+    schema.leaves_per_row = leavesPerRow(*mesh, lattice);
+    field_ = std::make_unique<MeshDistance>(std::move(mesh), lattice, band_, extras_);
+    schema.grids = gridsOf(field_->run({lattice.box.min().z(), lattice.box.min().z()}));
+    return schema;
+  }
+
+  [[nodiscard]] double memoryBytes() const override { return field_->memoryBytes(); }
+
+  [[nodiscard]] Grids run(ZRange core) const override { return gridsOf(field_->run(core)); }
+
+ private:
+  Vec3d pitchMm(Schema& schema) const {
+    if (printer_.empty() == pitch_.empty())
+      throw UsageError("give either --printer NAME or --pitch DX,DY,DZ");
+    if (!printer_.empty()) {
+      const PrinterProfile profile = readPrinterProfile(printer_);
+      schema.metadata["vdbdither:printer"] = toJson(profile);
+      return profile.pitch_mm;
+    }
+    Vec3d pitch_mm;
+    std::size_t begin = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::size_t comma = pitch_.find(',', begin);
+      if ((comma == std::string::npos) != (axis == 2))
+        throw UsageError("--pitch: '" + pitch_ + "' is not three lengths such as 42um,84um,22um");
+      pitch_mm[axis] = parseLengthMm(std::string_view(pitch_).substr(begin, comma - begin));
+      if (!(pitch_mm[axis] >= 1e-3 && pitch_mm[axis] <= 10))
+        throw UsageError("--pitch: '" + pitch_ + "' is not between 1 um and 10 mm in every axis");
+      begin = comma + 1;
+    }
+    return pitch_mm;
+  }
+
+  Mesh readMeshes() const {
+    std::vector<Mesh> meshes;
+    for (const std::string& path : paths_) {
+      meshes.push_back(readMesh(path, [this](const std::string& text) { report().warn(text); }));
+    }
+    return joined(std::move(meshes));
+  }
+
+  void placeMesh(Mesh& mesh) const {
+    const auto unit = std::find_if(units_mm.begin(), units_mm.end(),
+                                   [this](const auto& known) { return known.first == unit_; });
+    double factor = unit->second * scale_;
+    rotate(mesh, rotate_);
+    if (fit_mm_ > 0) {
+      const Bounds bounds = boundsOf(mesh);
+      const Vec3d extent = bounds.max - bounds.min;
+      const double longest = std::max({extent.x(), extent.y(), extent.z()});
+      if (!(longest > 0)) throw DataError("--fit: the mesh has no extent");
+      factor = fit_mm_ / longest;
+    }
+    for (Vec3d& vertex : mesh.vertices) vertex *= factor;
+    if (!place_) return;
+    const Vec3d corner = boundsOf(mesh).min;
+    for (Vec3d& vertex : mesh.vertices) vertex -= corner;
+  }
+
+  /// The voxels within a voxel diagonal of the mesh's bounding box; where y is refined, the same
+  /// region in finer voxels.
+  Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm) const {
+    const Bounds bounds = boundsOf(mesh);
+    const double margin_mm = pitch_mm.length();
+    for (int axis = 0; axis < 3; ++axis) {
+      const double furthest_mm =
+          std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) + margin_mm;
+      if (!(furthest_mm / pitch_mm[axis] * refine_y_ < 1e8))
+        throw DataError(
+            "the mesh reaches " + shortestText(furthest_mm) +
+            " mm from the origin, more voxels than can be counted; check --unit and --scale");
+    }
+    Lattice lattice{pitch_mm, Vec3d(0, 0, 0),
+                    CoordBBox(Coord::floor((bounds.min - margin_mm) / pitch_mm),
+                              Coord::ceil((bounds.max + margin_mm) / pitch_mm))};
+    if (refine_y_ > 1) {
+      // The centres of the finer voxels lie symmetrically about that of the one they replace.
+      lattice.origin_mm.y() = -0.5 * pitch_mm.y() * (refine_y_ - 1) / refine_y_;
+      lattice.pitch_mm.y() = pitch_mm.y() / refine_y_;
+      lattice.box.min().y() *= refine_y_;
+      lattice.box.max().y() = lattice.box.max().y() * refine_y_ + refine_y_ - 1;
+    }
+    return lattice;
+  }
+
+  /// Every leaf that the band meets, spread by the area of the surface over the rows that it
+  /// crosses.
+  double leavesPerRow(const Mesh& mesh, const Lattice& lattice) const {
+    const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
+    const auto rows = static_cast<std::size_t>(lattice.layers().size() / leaf_layers + 2);
+    const double low = lattice.layers().begin * lattice.pitch_mm.z();
+    std::vector<double> leaves(rows + 1, 0.0);
+    for (const Mesh::Triangle& t : mesh.triangles) {
+      const Vec3d& a = mesh.vertices[t[0]];
+      const Vec3d& b = mesh.vertices[t[1]];
+      const Vec3d& c = mesh.vertices[t[2]];
+      const Vec3d area = 0.5 * (b - a).cross(c - a);
+      // The region within the band of the triangle, widened by the leaf's own extent along its
+      // normal.
+      const double across = std::abs(area.x()) * leaf_mm.x() + std::abs(area.y()) * leaf_mm.y() +
+                            std::abs(area.z()) * leaf_mm.z();
+      const double touched = (2 * band_.mm * area.length() + across) / leaf_mm.product();
+      const auto [z_low, z_high] = std::minmax({a.z(), b.z(), c.z()});
+      const auto first = static_cast<std::size_t>(
+          std::clamp((z_low - band_.mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
+      const auto last = static_cast<std::size_t>(
+          std::clamp((z_high + band_.mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
+      for (std::size_t row = first; row <= last; ++row)
+        leaves[row] += touched / static_cast<double>(last - first + 1);
+    }
+    return *std::max_element(leaves.begin(), leaves.end());
+  }
+
+  static Grids gridsOf(const DistanceGrids& made) {
+    Grids grids{{"surface", made.surface}};
+    if (made.normals) grids["N"] = made.normals;
+    if (made.closest) grids["closest"] = made.closest;
+    return grids;
+  }
+
+  std::vector<std::string> paths_;
+  std::string printer_;
+  std::string pitch_;
+  std::string unit_ = "mm";
+  double scale_ = 1;
+  double fit_mm_ = 0;
+  Vec3d rotate_{0, 0, 0};
+  bool place_ = false;
+  int refine_y_ = 1;
+  double band_mm_ = 0;
+  DistanceExtras extras_;
+
+  Band band_;
+  std::unique_ptr<MeshDistance> field_;
+};
+
+}  // namespace
+
+extern const OperatorInfo mesh2sdf;
+const OperatorInfo mesh2sdf{
+    "mesh2sdf", "Signed distance in mm from triangle meshes, on the printer's lattice",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 -o surface.vdb",
+    []() -> std::unique_ptr<Operator> { return std::make_unique<MeshToSdf>(); }};
+
+}  // namespace vdbdither

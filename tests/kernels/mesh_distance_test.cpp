@@ -1,0 +1,354 @@
+#include "ops/kernels/mesh_distance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/Prune.h>
+#include <tbb/global_control.h>
+
+#include "tests/support/shapes.h"
+
+namespace vdbdither {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::Vec3d;
+using test::boxMesh;
+using test::sphereMesh;
+using test::torusMesh;
+using test::transformed;
+
+/// Nearest point of a triangle by Ericson's regions ("Real-Time Collision Detection", 5.1.5).
+Vec3d nearestPoint(const Vec3d& p, const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+  const auto onSegment = [&](const Vec3d& from, const Vec3d& to) {
+    const double length = (to - from).lengthSqr();
+    return length > 0
+               ? from + (to - from) * std::clamp((p - from).dot(to - from) / length, 0.0, 1.0)
+               : from;
+  };
+  Vec3d best = onSegment(a, b);
+  for (const Vec3d& other : {onSegment(b, c), onSegment(c, a)})
+    if ((other - p).lengthSqr() < (best - p).lengthSqr()) best = other;
+  const Vec3d n = (b - a).cross(c - a);
+  if (n.dot((b - a).cross(p - a)) >= 0 && n.dot((c - b).cross(p - b)) >= 0 &&
+      n.dot((a - c).cross(p - c)) >= 0 && n.lengthSqr() > 1e-20) {
+    const Vec3d foot = p - n * (n.dot(p - a) / n.lengthSqr());
+    if ((foot - p).lengthSqr() < (best - p).lengthSqr()) best = foot;
+  }
+  return best;
+}
+
+struct Nearest {
+  double distance = std::numeric_limits<double>::infinity();
+  Vec3d point;
+};
+
+Nearest bruteForce(const Mesh& mesh, const Vec3d& p) {
+  Nearest best;
+  for (const Mesh::Triangle& t : mesh.triangles) {
+    const Vec3d point =
+        nearestPoint(p, mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
+    const double distance = (point - p).length();
+    if (distance < best.distance) best = {distance, point};
+  }
+  return best;
+}
+
+/// Generalized winding number (van Oosterom and Strackee's solid angles).
+double windingNumber(const Mesh& mesh, const Vec3d& p) {
+  double sum = 0;
+  for (const Mesh::Triangle& t : mesh.triangles) {
+    const Vec3d a = mesh.vertices[t[0]] - p;
+    const Vec3d b = mesh.vertices[t[1]] - p;
+    const Vec3d c = mesh.vertices[t[2]] - p;
+    const double la = a.length(), lb = b.length(), lc = c.length();
+    sum += 2 * std::atan2(a.dot(b.cross(c)),
+                          la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return sum / (4 * std::numbers::pi);
+}
+
+Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm, const Vec3d& origin_mm, int margin) {
+  openvdb::math::BBox<Vec3d> bounds;
+  for (const Vec3d& v : mesh.vertices) bounds.expand(v);
+  const Vec3d low = (bounds.min() - origin_mm) / pitch_mm;
+  const Vec3d high = (bounds.max() - origin_mm) / pitch_mm;
+  return {pitch_mm, origin_mm,
+          CoordBBox(Coord::floor(low).offsetBy(-margin), Coord::ceil(high).offsetBy(margin))};
+}
+
+DistanceGrids distances(const Mesh& mesh, const Lattice& lattice, double band_mm,
+                        DistanceExtras extras = {}) {
+  return MeshDistance(std::make_shared<Mesh>(mesh), lattice, Band{band_mm}, extras)
+      .run(lattice.layers());
+}
+
+const Vec3d mimaki(0.042, 0.084, 0.022);
+const Vec3d stratasys(25.4 / 600, 25.4 / 300, 0.027);
+const Vec3d cube(0.05, 0.05, 0.05);
+
+/// Checks active states and values of all voxels in the box, and signs where `closed`.
+void expectExact(const Mesh& mesh, const Lattice& lattice, double band_mm, bool closed) {
+  const DistanceGrids grids = distances(mesh, lattice, band_mm);
+  const openvdb::FloatGrid::ConstAccessor surface = grids.surface->getConstAccessor();
+  const auto background = static_cast<float>(band_mm);
+  std::mt19937 random(7);
+  int active = 0;
+  int wrong = 0;
+  for (auto it = lattice.box.begin(); it && wrong < 5; ++it) {
+    const Coord ijk = *it;
+    const bool on = surface.isValueOn(ijk);
+    // Far voxels are many and dull: look at some.
+    if (!on && random() % 8 != 0) continue;
+    const Vec3d p = lattice.position(ijk);
+    const double exact = bruteForce(mesh, p).distance;
+    const float value = surface.getValue(ijk);
+    if (on) {
+      ++active;
+      if (std::abs(std::abs(value) - exact) > 1e-6)
+        ++wrong, ADD_FAILURE() << ijk << " " << value << " exact " << exact;
+      if (exact > band_mm + 1e-6)
+        ++wrong, ADD_FAILURE() << ijk << " is active beyond the band: " << exact;
+    } else {
+      if (exact < band_mm - 1e-6)
+        ++wrong, ADD_FAILURE() << ijk << " is inactive within the band: " << exact;
+      if (std::abs(value) != background)
+        ++wrong, ADD_FAILURE() << ijk << " is inactive with " << value;
+    }
+    if (closed && exact > 1e-6 && (!on || random() % 4 == 0)) {
+      const bool inside = std::abs(windingNumber(mesh, p)) > 0.5;
+      if (inside != (value < 0)) ++wrong, ADD_FAILURE() << ijk << " has the wrong sign: " << value;
+    }
+  }
+  EXPECT_GT(active, 0);
+}
+
+class OnEveryLattice : public testing::TestWithParam<std::pair<Vec3d, Vec3d>> {
+ protected:
+  void expectExactOn(const Mesh& mesh, bool closed = true) {
+    const auto& [pitch, origin] = GetParam();
+    expectExact(mesh, latticeAround(mesh, pitch, origin, 5), pitch.length() * 1.5, closed);
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Lattices, OnEveryLattice,
+                         testing::Values(std::pair(mimaki, Vec3d(0, 0, 0)),
+                                         std::pair(stratasys, Vec3d(0, 0, 0)),
+                                         std::pair(cube, Vec3d(0, 0, 0)),
+                                         std::pair(mimaki, Vec3d(0.0, -0.021, 0.0))));
+
+TEST_P(OnEveryLattice, DistanceToASphereIsExact) {
+  expectExactOn(sphereMesh({0.3, -0.2, 0.1}, 0.4, 9));
+}
+
+TEST_P(OnEveryLattice, DistanceToATiltedBoxIsExact) {
+  expectExactOn(
+      transformed(boxMesh({-0.5, -0.4, -0.3}, {0.5, 0.4, 0.3}), {2, 31, 12}, {0.1, 0.2, 0.3}));
+}
+
+TEST_P(OnEveryLattice, DistanceToABoxOnTheLatticeIsExact) {
+  const Vec3d& pitch = GetParam().first;
+  expectExactOn(boxMesh(pitch * Vec3d(-4, -3, -8), pitch * Vec3d(5, 4, 11)));
+}
+
+TEST_P(OnEveryLattice, DistanceToATorusIsExact) {
+  expectExactOn(torusMesh({0, 0, 0.4}, 0.4, 0.15, 16));
+}
+
+TEST_P(OnEveryLattice, DistanceToAThinPlateIsExact) {
+  expectExactOn(transformed(boxMesh({-0.7, -0.6, 0}, {0.7, 0.6, 0.004}), {3, 5, 0}, {0, 0, 0}));
+}
+
+TEST_P(OnEveryLattice, CavitiesStayHollowInEitherOrientation) {
+  Mesh mesh = sphereMesh({0, 0, 0}, 0.4, 6);
+  const Mesh cavity = sphereMesh({0.02, 0, 0}, 0.25, 5);
+  const auto offset = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), cavity.vertices.begin(), cavity.vertices.end());
+  for (const Mesh::Triangle& t : cavity.triangles)
+    mesh.triangles.push_back({t[0] + offset, t[2] + offset, t[1] + offset});
+  expectExactOn(mesh);
+  for (Mesh::Triangle& t : mesh.triangles) std::swap(t[0], t[1]);
+  expectExactOn(mesh);
+}
+
+Mesh randomSoup(unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> place(-0.6, 0.6);
+  std::normal_distribution<double> normal;
+  const auto point = [&] { return Vec3d(place(random), place(random), place(random)); };
+  Mesh mesh;
+  for (int i = 0; i < 24; ++i) {
+    const Vec3d a = point();
+    const Vec3d away = Vec3d(normal(random), normal(random), normal(random));
+    Vec3d b = point();
+    Vec3d c = point();
+    switch (i % 6) {
+      case 1:  // a sliver
+        c = a + (b - a) * 0.4 + away * 1e-6;
+        break;
+      case 2:  // much smaller than a voxel
+        b = a + away * 1e-3;
+        c = a + Vec3d(1e-3, 0, 0);
+        break;
+      case 3:  // no area
+        c = a + (b - a) * 0.3;
+        break;
+      case 4:  // a point
+        b = c = a;
+        break;
+      case 5:  // parallel to x, to z
+        b = a + Vec3d(0.3, 0, 0);
+        c = a + Vec3d(0, 0, 0.4);
+        break;
+      default:
+        break;
+    }
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), {a, b, c});
+    // Some hang on the triangle before, at a vertex or at an edge.
+    mesh.triangles.push_back({first, first + 1, i % 4 == 3 ? first - 1 : first + 2});
+  }
+  return mesh;
+}
+
+TEST_P(OnEveryLattice, DistanceToRandomSoupsIsExact) {
+  for (unsigned seed = 0; seed < 3; ++seed) expectExactOn(randomSoup(seed), false);
+}
+
+TEST(MeshDistance, IsExactAMetreFromTheOrigin) {
+  const Mesh mesh =
+      transformed(boxMesh({-0.3, -0.2, -0.2}, {0.3, 0.2, 0.2}), {7, 40, 3}, {999, -998, 997});
+  expectExact(mesh, latticeAround(mesh, mimaki, {0, 0, 0}, 4), 0.15, true);
+}
+
+TEST(MeshDistance, AbruptVerticesOfManyEdgesAreExact) {
+  // A needle of 40 sides: its tip has more edges than a vertex keeps bounds.
+  Mesh mesh;
+  mesh.vertices.emplace_back(0, 0, 0.8);
+  mesh.vertices.emplace_back(0, 0, 0);
+  for (int i = 0; i < 40; ++i) {
+    const double angle = 2 * std::numbers::pi * i / 40;
+    mesh.vertices.emplace_back(0.3 * std::cos(angle), 0.3 * std::sin(angle), 0);
+  }
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    mesh.triangles.push_back({0, 2 + i, 2 + (i + 1) % 40});
+    mesh.triangles.push_back({1, 2 + (i + 1) % 40, 2 + i});
+  }
+  expectExact(mesh, latticeAround(mesh, mimaki, {0, 0, 0}, 4), 0.15, true);
+}
+
+void expectSame(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
+  EXPECT_TRUE(a.tree().hasSameTopology(b.tree()));
+  for (auto it = a.tree().cbeginLeaf(); it; ++it) {
+    const auto* other = b.tree().probeConstLeaf(it->origin());
+    ASSERT_TRUE(other);
+    ASSERT_TRUE(std::equal(it->buffer().data(), it->buffer().data() + 512, other->buffer().data()))
+        << it->origin();
+  }
+}
+
+TEST(MeshDistance, SlabsOfAnyHeightGiveTheWhole) {
+  const Mesh mesh = transformed(torusMesh({0, 0, 0}, 0.8, 0.3, 30), {20, 30, 0}, {0.3, 0, 0});
+  const Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);
+  const MeshDistance field(std::make_shared<Mesh>(mesh), lattice, Band{0.12});
+  const DistanceGrids whole = field.run(lattice.layers());
+  for (const int height : {8, 16, 40}) {
+    const auto pieces = openvdb::FloatGrid::create(0.12F);
+    const ZRange all = alignedToLeaves(lattice.layers());
+    for (int begin = all.begin; begin < all.end; begin += height)
+      pieces->tree().merge(field.run({begin, begin + height}).surface->tree());
+    openvdb::tools::prune(pieces->tree());
+    expectSame(*whole.surface, *pieces);
+  }
+}
+
+TEST(MeshDistance, ThreadsDoNotChangeABit) {
+  const Mesh mesh = sphereMesh({0, 0, 0}, 0.9, 40);
+  const Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);
+  const DistanceGrids many = distances(mesh, lattice, 0.12, {true, true});
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const DistanceGrids few = distances(mesh, lattice, 0.12, {true, true});
+  expectSame(*many.surface, *few.surface);
+  for (auto it = many.normals->cbeginValueOn(); it; ++it)
+    ASSERT_EQ(*it, few.normals->tree().getValue(it.getCoord()));
+  for (auto it = many.closest->cbeginValueOn(); it; ++it)
+    ASSERT_EQ(*it, few.closest->tree().getValue(it.getCoord()));
+}
+
+TEST(MeshDistance, NormalsPointFromTheNearestPointOutwards) {
+  const Mesh mesh =
+      transformed(boxMesh({-0.5, -0.4, -0.3}, {0.5, 0.4, 0.3}), {2, 31, 12}, {0.1, 0.2, 0.3});
+  const Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);
+  const DistanceGrids grids = distances(mesh, lattice, 0.12, {true, true});
+  EXPECT_EQ(grids.normals->activeVoxelCount(), grids.surface->activeVoxelCount());
+  EXPECT_EQ(grids.closest->activeVoxelCount(), grids.surface->activeVoxelCount());
+  EXPECT_EQ(grids.normals->getVectorType(), openvdb::VEC_COVARIANT_NORMALIZE);
+  for (auto it = grids.normals->cbeginValueOn(); it; ++it) {
+    const Vec3d p = lattice.position(it.getCoord());
+    const double distance = grids.surface->tree().getValue(it.getCoord());
+    const Mesh::Triangle& t =
+        mesh.triangles[static_cast<std::size_t>(grids.closest->tree().getValue(it.getCoord()))];
+    const Vec3d point =
+        nearestPoint(p, mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]);
+    ASSERT_NEAR((point - p).length(), std::abs(distance), 1e-6);
+    ASSERT_NEAR(Vec3d(*it).length(), 1, 1e-6);
+    if (std::abs(distance) > 1e-3) {
+      // Inside and halfway between two faces either will do.
+      const Vec3d expected = (p - point) / distance;
+      ASSERT_NEAR((Vec3d(*it) - expected).length(), 0, 1e-4) << it.getCoord();
+    }
+  }
+}
+
+TEST(MeshDistance, NormalsOnTheSurfaceAreThoseOfTheMesh) {
+  const Mesh mesh = boxMesh({0, 0, 0}, mimaki * Vec3d(10, 10, 10));
+  const Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);
+  const DistanceGrids grids = distances(mesh, lattice, 0.12, {true, false});
+  const auto normal = [&](int i, int j, int k) {
+    return Vec3d(grids.normals->tree().getValue(Coord(i, j, k)));
+  };
+  EXPECT_NEAR((normal(5, 5, 10) - Vec3d(0, 0, 1)).length(), 0, 1e-6);
+  EXPECT_NEAR((normal(5, 0, 5) - Vec3d(0, -1, 0)).length(), 0, 1e-6);
+}
+
+TEST(MeshDistance, VoxelsOutsideTheBoxAreBackground) {
+  const Mesh mesh = sphereMesh({0, 0, 0}, 0.6, 12);
+  Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);
+  const DistanceGrids whole = distances(mesh, lattice, 0.1);
+  lattice.box = CoordBBox(Coord(-3, -5, -11), Coord(9, 6, 13));
+  const DistanceGrids part = distances(mesh, lattice, 0.1);
+  for (auto it = CoordBBox(Coord(-20, -20, -40), Coord(20, 20, 40)).begin(); it; ++it) {
+    const bool inside = lattice.box.isInside(*it);
+    ASSERT_EQ(part.surface->tree().getValue(*it),
+              inside ? whole.surface->tree().getValue(*it) : 0.1F)
+        << *it;
+    ASSERT_EQ(part.surface->tree().isValueOn(*it), inside && whole.surface->tree().isValueOn(*it))
+        << *it;
+  }
+}
+
+TEST(MeshDistance, GridsAreNamedAndPlacedForOtherTools) {
+  Lattice lattice{mimaki, {0, -0.021, 0}, CoordBBox(Coord(-9), Coord(9))};
+  const DistanceGrids grids = distances(sphereMesh({0, 0, 0}, 0.1, 6), lattice, 0.1);
+  EXPECT_EQ(grids.surface->getName(), "surface");
+  EXPECT_EQ(grids.surface->getGridClass(), openvdb::GRID_LEVEL_SET);
+  EXPECT_EQ(grids.surface->background(), 0.1F);
+  EXPECT_EQ(grids.surface->indexToWorld(Coord(1, 2, 3)), lattice.position(Coord(1, 2, 3)));
+  lattice.origin_mm = {0, 0, 0};
+  EXPECT_TRUE(
+      distances(sphereMesh({0, 0, 0}, 0.1, 6), lattice, 0.1).surface->transform().isLinear());
+}
+
+TEST(MeshDistance, AnEmptyMeshGivesAnEmptyGrid) {
+  const DistanceGrids grids =
+      distances(Mesh{}, {mimaki, {0, 0, 0}, CoordBBox(Coord(0), Coord(9))}, 0.1);
+  EXPECT_TRUE(grids.surface->empty());
+}
+
+}  // namespace
+}  // namespace vdbdither

@@ -1,0 +1,149 @@
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/shapes.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+extern const OperatorInfo mesh2sdf;
+
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::Vec3d;
+using testing::HasSubstr;
+
+void writeObj(const std::filesystem::path& path, const Mesh& mesh) {
+  std::ofstream out(path);
+  out.precision(17);
+  for (const Vec3d& v : mesh.vertices) out << "v " << v.x() << ' ' << v.y() << ' ' << v.z() << '\n';
+  for (const Mesh::Triangle& t : mesh.triangles)
+    out << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+}
+
+class Mesh2Sdf : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::filesystem::create_directories(folder_);
+    path_ = (folder_ / "part.obj").string();
+    writeObj(path_, test::boxMesh({1, 2, 3}, {2, 2.5, 3.25}));
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  Schema plan(std::vector<std::string> arguments) {
+    operator_ = mesh2sdf.make();
+    Options options;
+    operator_->declare(options);
+    arguments.insert(arguments.begin(), path_);
+    options.parse(arguments);
+    return source().plan();
+  }
+  Source& source() { return dynamic_cast<Source&>(*operator_); }
+
+  float distanceAt(const Schema& schema, const Coord& ijk) {
+    const Grids grids = source().run(schema.lattice.layers());
+    return openvdb::gridConstPtrCast<openvdb::FloatGrid>(grids.at("surface"))->tree().getValue(ijk);
+  }
+
+  template <class Failure>
+  std::string refusal(const std::vector<std::string>& arguments) {
+    try {
+      plan(arguments);
+    } catch (const Failure& failure) {
+      return failure.what();
+    }
+    return "accepted";
+  }
+
+  std::filesystem::path folder_;
+  std::string path_;
+  std::unique_ptr<Operator> operator_;
+};
+
+TEST_F(Mesh2Sdf, KeepsThePositionOfTheMesh) {
+  const Schema schema = plan({"--pitch",
+                              "50um"
+                              ",50um,0.025"});
+  EXPECT_EQ(schema.lattice.pitch_mm, Vec3d(0.05, 0.05, 0.025));
+  EXPECT_NEAR(distanceAt(schema, Coord(30, 45, 130)), 0, 1e-6);
+  EXPECT_NEAR(distanceAt(schema, Coord(30, 45, 131)), 0.025, 1e-6);
+  EXPECT_NEAR(distanceAt(schema, Coord(30, 45, 129)), -0.025, 1e-6);
+}
+
+TEST_F(Mesh2Sdf, TheBoxHoldsTheMeshAndAVoxelDiagonalAround) {
+  const Schema schema = plan({"--pitch", "0.1,0.1,0.05"});
+  EXPECT_EQ(schema.lattice.box, CoordBBox(Coord(8, 18, 57), Coord(22, 27, 68)));
+}
+
+TEST_F(Mesh2Sdf, PlacesTheMeshOnTheBed) {
+  const Schema schema = plan({"--pitch", "0.1,0.1,0.06", "--place"});
+  EXPECT_EQ(schema.lattice.box, CoordBBox(Coord(-2, -2, -3), Coord(12, 7, 7)));
+  EXPECT_NEAR(distanceAt(schema, Coord(5, 2, 0)), 0, 1e-6);
+}
+
+TEST_F(Mesh2Sdf, ScalesByUnitFactorAndFit) {
+  EXPECT_EQ(plan({"--pitch", "0.1,0.1,0.1", "--unit", "cm", "--place"}).lattice.box.max().x(), 102);
+  EXPECT_EQ(plan({"--pitch", "0.1,0.1,0.1", "--scale", "3", "--place"}).lattice.box.max().x(), 32);
+  EXPECT_EQ(plan({"--pitch", "0.1,0.1,0.1", "--fit", "4mm", "--place"}).lattice.box.max().x(), 42);
+}
+
+TEST_F(Mesh2Sdf, TurnsAboutXThenYThenZ) {
+  // The long axis goes from x by y to −z, and stays there.
+  const Schema schema = plan({"--pitch", "0.1,0.1,0.1", "--rotate", "0,90,0", "--place"});
+  EXPECT_EQ(schema.lattice.box.max(), Coord(5, 7, 12));
+}
+
+TEST_F(Mesh2Sdf, RefinedCentresLieAQuarterVoxelBesideThePlainOnes) {
+  const Schema plain = plan({"--pitch", "0.1,0.1,0.05"});
+  const Schema fine = plan({"--pitch", "0.1,0.1,0.05", "--refine-y", "2"});
+  EXPECT_EQ(fine.lattice.box.min().y(), 2 * plain.lattice.box.min().y());
+  EXPECT_EQ(fine.lattice.box.max().y(), 2 * plain.lattice.box.max().y() + 1);
+  for (const int j : {-3, 0, 20}) {
+    EXPECT_DOUBLE_EQ(fine.lattice.position({0, 2 * j, 0}).y(), 0.1 * j - 0.025);
+    EXPECT_DOUBLE_EQ(fine.lattice.position({0, 2 * j + 1, 0}).y(), 0.1 * j + 0.025);
+  }
+  EXPECT_NEAR(distanceAt(fine, Coord(15, 40, 62)), 0.025, 1e-6);
+}
+
+TEST_F(Mesh2Sdf, AddsNormalsAndNearestTrianglesOnDemand) {
+  EXPECT_EQ(plan({"--pitch", "0.1,0.1,0.05"}).grids.size(), 1U);
+  const Schema schema = plan({"--pitch", "0.1,0.1,0.05", "--normals", "--closest"});
+  const Grids grids = source().run(schema.lattice.layers());
+  EXPECT_EQ(grids.size(), 3U);
+  for (const auto& [name, grid] : grids) {
+    EXPECT_EQ(grid->getName(), name);
+    EXPECT_EQ(grid->activeVoxelCount(), grids.at("surface")->activeVoxelCount());
+    EXPECT_EQ(schema.grids.at(name)->type(), grid->type());
+  }
+}
+
+TEST_F(Mesh2Sdf, CarriesThePrinterProfile) {
+  std::ofstream(folder_ / "mine.json")
+      << R"({"name":"mine","title":"Mine","source":"here","pitch_mm":["0.1","0.1","0.05"],)"
+      << R"("build_mm":[0,0,0],"materials":[]})";
+  const Schema schema = plan({"--printer", (folder_ / "mine.json").string()});
+  EXPECT_EQ(schema.lattice.pitch_mm, Vec3d(0.1, 0.1, 0.05));
+  EXPECT_THAT(schema.metadata.at("vdbdither:printer"), HasSubstr("mine"));
+}
+
+TEST_F(Mesh2Sdf, RefusesWhatItCannotMean) {
+  EXPECT_EQ(refusal<UsageError>({}), "give either --printer NAME or --pitch DX,DY,DZ");
+  EXPECT_EQ(refusal<UsageError>({"--pitch", "1,2"}),
+            "--pitch: '1,2' is not three lengths such as 42um,84um,22um");
+  EXPECT_EQ(refusal<UsageError>({"--pitch", "1,2,0"}),
+            "--pitch: '1,2,0' is not between 1 um and 10 mm in every axis");
+  EXPECT_THAT(refusal<DataError>({"--pitch", "1um,1um,1um", "--unit", "m", "--scale", "1000"}),
+              HasSubstr("more voxels than can be counted; check --unit and --scale"));
+}
+
+}  // namespace
+}  // namespace vdbdither
