@@ -1,0 +1,246 @@
+#include "io/png_runs.h"
+
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <random>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <png.h>
+#include <spng.h>
+
+#include "tests/support/run_images.h"
+#include "vdbdither/errors.h"
+
+namespace vdbdither {
+namespace {
+
+using test::runImage;
+
+struct Decoded {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  int bit_depth = 0;
+  int colour_type = 0;
+  std::uint32_t dots_per_metre_x = 0;
+  std::uint32_t dots_per_metre_y = 0;
+  std::vector<std::uint8_t> rows;  ///< as stored: packed bits for one bit a pixel
+};
+
+/// libpng, with every error and warning a failure.
+Decoded decodeByLibpng(const std::vector<std::uint8_t>& bytes) {
+  Decoded result;
+  const auto complain = [](png_structp png, png_const_charp text) {
+    *static_cast<std::string*>(png_get_error_ptr(png)) = text;
+    png_longjmp(png, 1);
+  };
+  std::string error;
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &error, complain, complain);
+  png_infop info = png_create_info_struct(png);
+  std::pair<const std::uint8_t*, std::size_t> left{bytes.data(), bytes.size()};
+  std::vector<png_bytep> row_pointers;
+  if (setjmp(png_jmpbuf(png)) == 0) {
+    png_set_read_fn(png, &left, [](png_structp reader, png_bytep to, std::size_t size) {
+      auto& [from, rest] =
+          *static_cast<std::pair<const std::uint8_t*, std::size_t>*>(png_get_io_ptr(reader));
+      if (size > rest) png_error(reader, "truncated");
+      std::copy_n(from, size, to);
+      from += size;
+      rest -= size;
+    });
+    png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
+    png_set_user_limits(png, 1 << 25, 1 << 25);
+    png_read_info(png, info);
+    result.width = png_get_image_width(png, info);
+    result.height = png_get_image_height(png, info);
+    result.bit_depth = png_get_bit_depth(png, info);
+    result.colour_type = png_get_color_type(png, info);
+    int unit = 0;
+    png_get_pHYs(png, info, &result.dots_per_metre_x, &result.dots_per_metre_y, &unit);
+    const std::size_t stride = png_get_rowbytes(png, info);
+    result.rows.resize(stride * result.height);
+    for (std::size_t y = 0; y < result.height; ++y)
+      row_pointers.push_back(result.rows.data() + stride * y);
+    png_read_image(png, row_pointers.data());
+    png_read_end(png, nullptr);
+  }
+  png_destroy_read_struct(&png, &info, nullptr);
+  EXPECT_EQ(error, "");
+  EXPECT_EQ(left.second, 0U) << "bytes after the image";
+  return result;
+}
+
+std::vector<std::uint8_t> decodeBySpng(const std::vector<std::uint8_t>& bytes) {
+  spng_ctx* context = spng_ctx_new(0);
+  EXPECT_EQ(spng_set_crc_action(context, SPNG_CRC_ERROR, SPNG_CRC_ERROR), 0);
+  spng_set_image_limits(context, 1 << 25, 1 << 25);
+  spng_set_png_buffer(context, bytes.data(), bytes.size());
+  std::size_t size = 0;
+  EXPECT_EQ(spng_decoded_image_size(context, SPNG_FMT_RAW, &size), 0);
+  std::vector<std::uint8_t> rows(size);
+  const int failed = spng_decode_image(context, rows.data(), rows.size(), SPNG_FMT_RAW, 0);
+  EXPECT_EQ(failed, 0) << spng_strerror(failed);
+  spng_ctx_free(context);
+  return rows;
+}
+
+/// What the rows must hold, from the definition.
+std::vector<std::uint8_t> pixelBytes(const RunImage& image, const PngFormat& format) {
+  std::vector<std::uint8_t> bytes;
+  for (std::uint32_t y = 0; y < image.height; ++y) {
+    std::uint32_t x = 0;
+    const std::size_t row_begin = bytes.size();
+    for (const Run& run : image.row(y)) {
+      const std::uint32_t pixel = format.palette.empty() ? run.value : format.palette[run.value];
+      for (; x < run.end; ++x) {
+        if (format.pixels == PngPixels::rgba8) {
+          for (int shift = 0; shift < 32; shift += 8)
+            bytes.push_back(static_cast<std::uint8_t>(pixel >> shift));
+        } else if (format.pixels == PngPixels::grey8) {
+          bytes.push_back(static_cast<std::uint8_t>(pixel));
+        } else {
+          if (x % 8 == 0) bytes.push_back(0);
+          if (pixel) bytes[row_begin + x / 8] |= static_cast<std::uint8_t>(128 >> x % 8);
+        }
+      }
+    }
+  }
+  return bytes;
+}
+
+void expectDecodes(const RunImage& image, const PngFormat& format) {
+  const std::vector<std::uint8_t> bytes = encodePng(image, format);
+  const std::vector<std::uint8_t> expected = pixelBytes(image, format);
+  const Decoded decoded = decodeByLibpng(bytes);
+  EXPECT_EQ(decoded.width, image.width);
+  EXPECT_EQ(decoded.height, image.height);
+  EXPECT_EQ(decoded.bit_depth, format.pixels == PngPixels::grey1 ? 1 : 8);
+  EXPECT_EQ(decoded.colour_type,
+            format.pixels == PngPixels::rgba8 ? PNG_COLOR_TYPE_RGBA : PNG_COLOR_TYPE_GRAY);
+  EXPECT_TRUE(decoded.rows == expected) << "by libpng, " << image.width << " x " << image.height;
+  EXPECT_TRUE(decodeBySpng(bytes) == expected)
+      << "by spng, " << image.width << " x " << image.height;
+}
+
+void expectDecodesInEveryFormat(const RunImage& image, std::span<const std::uint32_t> colours) {
+  expectDecodes(image, {PngPixels::rgba8, colours, 0, 0});
+  std::vector<std::uint32_t> greys;
+  std::vector<std::uint32_t> bits;
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    greys.push_back(
+        static_cast<std::uint32_t>(i * 255 / std::max<std::size_t>(1, colours.size() - 1)));
+    bits.push_back(i % 2);
+  }
+  expectDecodes(image, {PngPixels::grey8, greys, 0, 0});
+  expectDecodes(image, {PngPixels::grey1, bits, 0, 0});
+}
+
+const std::vector<std::uint32_t> colours = {rgba(0, 0, 0),     rgba(240, 240, 240),
+                                            rgba(26, 26, 29),  rgba(0, 90, 158),
+                                            rgba(166, 33, 98), rgba(200, 189, 3, 17)};
+
+TEST(PngRuns, OnePixel) {
+  for (std::uint32_t value = 0; value < 2; ++value) {
+    expectDecodesInEveryFormat(runImage(1, 1, [&](int, int) { return value; }), colours);
+  }
+}
+
+TEST(PngRuns, EverySmallSizeOfNoise) {
+  std::mt19937 random(1);
+  for (int width = 1; width <= 20; ++width) {
+    for (int height = 1; height <= 7; ++height) {
+      const RunImage image =
+          runImage(width, height, [&](int, int) { return random() % colours.size(); });
+      expectDecodesInEveryFormat(image, colours);
+    }
+  }
+}
+
+TEST(PngRuns, EqualImagesOfEverySmallWidthWhereMatchesCrossManyRows) {
+  for (int width = 1; width <= 70; ++width) {
+    expectDecodesInEveryFormat(runImage(width, 300, [](int, int) { return 1U; }), colours);
+  }
+}
+
+TEST(PngRuns, RunsOfEveryRemainderOfTheLongestMatch) {
+  const RunImage image = runImage(700, 700, [](int x, int y) { return x < y ? 1U : 0U; });
+  expectDecodesInEveryFormat(image, colours);
+}
+
+TEST(PngRuns, SliceWithDitheredRim) {
+  for (const std::uint32_t seed : {1, 2}) {
+    expectDecodesInEveryFormat(test::ditheredDisc(601, 307, 6, seed), colours);
+  }
+}
+
+TEST(PngRuns, NoiseOfTwoAndSixColoursOverManyBlocks) {
+  std::mt19937 random(3);
+  expectDecodesInEveryFormat(runImage(900, 300, [&](int, int) { return random() % 2; }), colours);
+  expectDecodesInEveryFormat(runImage(900, 300, [&](int, int) { return random() % 6; }), colours);
+}
+
+TEST(PngRuns, NoiseOfPixelValuesWithoutPalette) {
+  std::mt19937 random(4);
+  expectDecodes(runImage(300, 200, [&](int, int) { return static_cast<std::uint32_t>(random()); }),
+                {});
+}
+
+TEST(PngRuns, RowsJustInsideAndOutsideTheWindow) {
+  std::mt19937 random(5);
+  for (const int width : {8190, 8191, 8192, 8193, 32766, 32767, 32768, 32769, 70000}) {
+    const RunImage image = runImage(width, 6, [&](int x, int y) {
+      return x / 50 % 7 == 0 ? static_cast<std::uint32_t>(random() % 3)
+                             : static_cast<std::uint32_t>((x + y) / 900 % 4);
+    });
+    expectDecodesInEveryFormat(image, colours);
+  }
+}
+
+TEST(PngRuns, BitsAcrossByteBorders) {
+  std::mt19937 random(6);
+  for (int round = 0; round < 200; ++round) {
+    const int width = 1 + static_cast<int>(random() % 90);
+    const std::uint32_t sparse = 1 + random() % 12;
+    const RunImage image =
+        runImage(width, 4, [&](int, int) { return random() % sparse == 0 ? 1U : 0U; });
+    expectDecodes(image, {PngPixels::grey1, {}, 0, 0});
+  }
+}
+
+TEST(PngRuns, NeighbouringRunsOfOneColourAreOne) {
+  const RunImage image =
+      runImage(500, 20, [](int x, int) { return static_cast<std::uint32_t>(x / 3 % 4); });
+  const std::vector<std::uint32_t> palette = {7, 7, 7, 7};
+  expectDecodes(image, {PngPixels::rgba8, palette, 0, 0});
+  EXPECT_EQ(encodePng(image, {PngPixels::rgba8, palette, 0, 0}),
+            encodePng(runImage(500, 20, [](int, int) { return 7U; }), {}));
+}
+
+TEST(PngRuns, PixelSizeIsDotsPerMetre) {
+  const RunImage image = runImage(3, 2, [](int, int) { return 0U; });
+  const Decoded decoded =
+      decodeByLibpng(encodePng(image, {PngPixels::grey8, {}, 25.4 / 600, 25.4 / 300}));
+  EXPECT_EQ(decoded.dots_per_metre_x, 23622U);
+  EXPECT_EQ(decoded.dots_per_metre_y, 11811U);
+}
+
+TEST(PngRuns, BlankImageCostsTwoBitsPer258BytesAndAFewPerRow) {
+  const RunImage image = runImage(2857, 1416, [](int, int) { return 0U; });
+  const double bytes = 1416.0 * 2857 * 4;
+  EXPECT_LT(static_cast<double>(encodePng(image, {PngPixels::rgba8, colours, 0, 0}).size()),
+            bytes / 258 / 4 + 1416 * 3 + 200);
+}
+
+TEST(PngRuns, AnImageWithoutPixelsIsRefused) {
+  EXPECT_THAT(
+      [] {
+        encodePng(RunImage{0, 3, {0, 0, 0, 0}, {}}, {});
+      },
+      testing::ThrowsMessage<DataError>(
+          "an image of 0 x 3 pixels cannot be a PNG; each side must have 1 to 16777216"));
+}
+
+}  // namespace
+}  // namespace vdbdither
