@@ -1,0 +1,131 @@
+#include <algorithm>
+#include <filesystem>
+
+#include "io/data_files.h"
+#include "ops/kernels/shape_dither.h"
+#include "ops/kernels/solid.h"
+#include "ops/kernels/threshold_mask.h"
+#include "vdbdither/find_grid.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::FloatGrid;
+using openvdb::Vec3SGrid;
+
+ThresholdMask readMask(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path))
+    throw UsageError("--mask: no such file '" + path.string() + "'");
+  try {
+    openvdb::io::File file(path.string());
+    file.open(false);
+    const auto grid = openvdb::gridPtrCast<FloatGrid>(file.readGrid("mask"));
+    if (!grid) throw DataError("grid 'mask' is not of floats");
+    return ThresholdMask(*grid);
+  } catch (const std::exception& error) {
+    throw DataError("--mask: '" + path.string() + "': " + error.what());
+  }
+}
+
+/// `solid` from `surface`: implicit shape dithering.
+class Dither : public Filter {
+ public:
+  void declare(Options& options) override {
+    options.text("mask", mask_, "blue|white|none|FILE.vdb",
+                 "Thresholds: the installed blue noise, white noise, none (plain voxels), or a "
+                 "tile of your own");
+    options.number("amplitude", amplitude_, 0, 8,
+                   "Half of it voxel diameters peak to peak, along the normal");
+    options.choice("at", at_, {"closest", "foot", "voxel"},
+                   "Where the mask is read: at the closest surface voxel, at the voxel of the foot "
+                   "point, or at the voxel itself");
+    options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the white noise");
+    options.flag("displaced", displaced_,
+                 "Adds the grid 'displaced', the displaced distances in mm");
+  }
+
+  Schema plan(const Schema& in) override {
+    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
+    has_normals_ = in.grids.contains("N");
+    if (has_normals_) findGrid<Vec3SGrid>(in.grids, "N");
+
+    dither_.pitch_mm = in.lattice.pitch_mm;
+    dither_.amplitude = mask_ == "none" ? 0 : amplitude_;
+    dither_.at = at_ == "closest" ? DitherAt::closest
+                 : at_ == "foot"  ? DitherAt::foot
+                                  : DitherAt::voxel;
+    dither_.mask = mask();
+    checkBand(surface->background());
+
+    Schema out = in;
+    out.grids["solid"] = makeSolidGrid(surface->transform());
+    if (displaced_) out.grids["displaced"] = makeDisplacedGrid(*surface);
+    return out;
+  }
+
+  [[nodiscard]] std::vector<Read> reads() const override {
+    const ShapeDither::Layers reach = dither_.reach(has_normals_);
+    std::vector<Read> reads{{"surface", Reach::stencil(reach.surface)}};
+    if (has_normals_ && dither_.amplitude != 0)
+      reads.push_back({"N", Reach::stencil(reach.normals)});
+    return reads;
+  }
+
+  [[nodiscard]] double memoryBytes() const override {
+    return static_cast<double>(dither_.mask.bytes());
+  }
+
+  [[nodiscard]] Grids run(const Slab& in) const override {
+    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
+    const auto normals =
+        has_normals_ && dither_.amplitude != 0 ? findGrid<Vec3SGrid>(in.grids, "N") : nullptr;
+    const ShapeDither::Result result =
+        dither_.run(*surface, normals.get(), in.core, in.valid, displaced_);
+    Grids out{{"solid", result.solid}};
+    if (displaced_) out["displaced"] = result.displaced;
+    return out;
+  }
+
+ private:
+  [[nodiscard]] ThresholdMask mask() const {
+    if (mask_ == "none") return ThresholdMask::constant(0.5F);
+    if (mask_ == "white") return ThresholdMask::whiteNoise(static_cast<std::uint64_t>(seed_));
+    if (mask_ != "blue") return readMask(mask_);
+    const auto installed = findDataFile("masks/blue.vdb");
+    if (!installed)
+      throw UsageError(
+          "--mask: the default mask 'masks/blue.vdb' is in no data folder; give a file or --mask "
+          "white");
+    return readMask(*installed);
+  }
+
+  /// The distances must reach as far as the displacements, and the surface voxels must have theirs.
+  void checkBand(double band_mm) const {
+    const double needed_mm = std::max(dither_.largestDisplacementMm(), dither_.pitch_mm.length());
+    if (dither_.amplitude == 0 || band_mm * (1 + 1e-6) >= needed_mm) return;
+    throw DataError("grid 'surface' holds distances up to " + shortestText(band_mm) +
+                    " mm, and --amplitude " + shortestText(amplitude_) + " on this lattice needs " +
+                    shortestText(needed_mm) + " mm");
+  }
+
+  std::string mask_ = "blue";
+  double amplitude_ = 4;
+  std::string at_ = "closest";
+  int seed_ = 1;
+  bool displaced_ = false;
+
+  ShapeDither dither_;
+  bool has_normals_ = false;
+};
+
+}  // namespace
+
+extern const OperatorInfo dither;
+const OperatorInfo dither{
+    "dither", "The printed voxels: shape dithering of the distance to the surface",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! normals ! dither ! slice-export out",
+    []() -> std::unique_ptr<Operator> { return std::make_unique<Dither>(); }};
+
+}  // namespace vdbdither

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <openvdb/openvdb.h>
+
+#include "ops/kernels/leaf_bits.h"
+#include "vdbdither/lattice.h"
+
+namespace vdbdither {
+
+/// ∂V, one leaf at a time: the voxels of V = { d < 0 } that have a 6-neighbour outside V.
+class SurfaceVoxels {
+ public:
+  /// `surface`: d in mm; inactive voxels and tiles count by their sign. Layers outside `valid` are
+  /// outside V.
+  SurfaceVoxels(const openvdb::FloatTree& surface, ZRange valid)
+      : surface_(surface), valid_(valid) {}
+
+  /// ∂V among the voxels of `leaf`, a leaf of the tree.
+  [[nodiscard]] LeafBits operator()(const FloatLeaf& leaf);
+
+ private:
+  openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> surface_;
+  ZRange valid_;
+};
+
+/// Eq. (4), v̄ = argmin over u in ∂V of ‖c(v) − c(u)‖₂, within a radius: what every search on one
+/// lattice shares.
+///
+/// The squared distance of voxels (di, dj, dk) apart is (di·dx)² + (dj·dy)² + (dk·dz)² in double
+/// precision, summed in this order; among equals the smallest (k, j, i) wins. Voxels farther than
+/// the radius are not found.
+class SearchDisk {
+ public:
+  SearchDisk(const openvdb::Vec3d& pitch_mm, double radius_mm);
+
+  /// How many voxels away along each axis one may be found.
+  [[nodiscard]] const openvdb::Coord& halo() const { return halo_; }
+
+ private:
+  friend class ClosestSurfaceVoxel;
+  struct Column {
+    double lateral2;  ///< (di·dx)² + (dj·dy)²
+    int i, j;
+    int offset;  ///< in the words of a tile
+  };
+
+  double radius2_;
+  openvdb::Coord halo_;
+  openvdb::Coord leaves_;        ///< leaves that the halo reaches into, on either side
+  int words_;                    ///< 64-bit words per column of a tile
+  std::vector<Column> columns_;  ///< by rising lateral distance
+  std::vector<double> height2_;  ///< (dk·dz)² by dk
+};
+
+/// Finds v̄ for the voxels of one leaf at a time.
+class ClosestSurfaceVoxel {
+ public:
+  /// `surface_voxels`: its active voxels are ∂V; what they hold is what the search brings back.
+  /// Both must outlive the search.
+  ClosestSurfaceVoxel(const openvdb::FloatTree& surface_voxels, const SearchDisk& disk);
+
+  struct Found {
+    openvdb::Coord ijk;
+    float value;
+  };
+
+  /// Turns to the leaf at `origin`; false where no leaf around it that the radius reaches holds a
+  /// surface voxel.
+  bool visit(const openvdb::Coord& origin);
+
+  /// The leaves that the radius reaches from the visited one, null where there are no surface
+  /// voxels.
+  [[nodiscard]] const std::vector<const FloatLeaf*>& leaves() const { return leaves_; }
+
+  /// v̄ of the voxel at `offset` in the leaf, nothing where none is within the radius.
+  [[nodiscard]] std::optional<Found> operator()(unsigned offset) const;
+
+ private:
+  openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> surface_voxels_;
+  const SearchDisk& disk_;
+  openvdb::Coord origin_;
+  std::vector<const FloatLeaf*> leaves_;
+  std::vector<std::uint64_t> tile_;  ///< ∂V in the leaf and its halo: a column along z per (x, y)
+};
+
+}  // namespace vdbdither

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <openvdb/openvdb.h>
+#include <tbb/parallel_for.h>
+
+#include "vdbdither/lattice.h"
+
+namespace vdbdither {
+
+using FloatLeaf = openvdb::FloatTree::LeafNodeType;
+
+/// One bit per voxel of a leaf, laid out as OpenVDB lays out its masks: word x, bit 8·y + z.
+using LeafBits = std::array<std::uint64_t, 8>;
+
+inline constexpr LeafBits no_bits{};
+
+/// A word whose rows along z are all `row`.
+constexpr std::uint64_t everyRow(std::uint8_t row) { return 0x0101010101010101U * row; }
+
+/// The rows of a leaf whose lowest layer is `leaf_z`, cut to the layers that `layers` holds.
+inline std::uint8_t rowWithin(int leaf_z, ZRange layers) {
+  const int begin = std::clamp(layers.begin - leaf_z, 0, leaf_layers);
+  const int end = std::clamp(layers.end - leaf_z, begin, leaf_layers);
+  return static_cast<std::uint8_t>((1U << end) - (1U << begin));
+}
+
+/// The bits of the voxels whose value satisfies `predicate`.
+template <typename Predicate>
+LeafBits bitsWhere(const float* values, Predicate predicate) {
+  LeafBits bits;
+  for (std::uint64_t& word : bits) {
+    word = 0;
+    for (int n = 0; n < 64; ++n) word |= std::uint64_t{predicate(values[n])} << n;
+    values += 64;
+  }
+  return bits;
+}
+
+/// V, the plain voxelization: the voxels with d < 0, active or not, of the rows that `row` lets
+/// through.
+inline LeafBits insideBits(const FloatLeaf& leaf, std::uint8_t row) {
+  LeafBits bits = bitsWhere(leaf.buffer().data(), [](float d) { return d < 0.0F; });
+  for (std::uint64_t& word : bits) word &= everyRow(row);
+  return bits;
+}
+
+/// Calls `visit(offset)` for every set bit, in rising order of the offset in the leaf.
+template <typename Visit>
+void forEachBit(const LeafBits& bits, Visit visit) {
+  for (unsigned x = 0; x < bits.size(); ++x) {
+    for (std::uint64_t word = bits[x]; word != 0; word &= word - 1) {
+      visit(64 * x + static_cast<unsigned>(std::countr_zero(word)));
+    }
+  }
+}
+
+/// The leaves of `tree` that hold some of `layers`, in the order of the tree.
+inline std::vector<const FloatLeaf*> leavesIn(const openvdb::FloatTree& tree, ZRange layers) {
+  std::vector<const FloatLeaf*> leaves;
+  tree.getNodes(leaves);
+  std::erase_if(leaves,
+                [&](const FloatLeaf* leaf) { return rowWithin(leaf->origin().z(), layers) == 0; });
+  return leaves;
+}
+
+/// Makes leaves in parallel and hangs them into `tree`. `make_worker()` returns what one thread
+/// works with: a function from a leaf of `sources` to a std::unique_ptr of the new leaf, null for
+/// none.
+template <typename Tree, typename MakeWorker>
+void addLeaves(Tree& tree, std::span<const FloatLeaf* const> sources,
+               const MakeWorker& make_worker) {
+  std::vector<std::unique_ptr<typename Tree::LeafNodeType>> made(sources.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {
+    auto make = make_worker();
+    for (std::size_t n = range.begin(); n != range.end(); ++n) made[n] = make(*sources[n]);
+  });
+  for (auto& leaf : made) {
+    if (leaf) tree.addLeaf(leaf.release());
+  }
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,203 @@
+// Eqs. (1)–(7) of Morsy, Brunton, Urban: Shape Dithering for 3D Printing, ACM Transactions on
+// Graphics 41(4), 2022.
+
+#include "ops/kernels/shape_dither.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "ops/kernels/closest_surface_voxel.h"
+#include "ops/kernels/gradient.h"
+#include "ops/kernels/leaf_bits.h"
+#include "ops/kernels/solid.h"
+#include "ops/kernels/voxel_diameter.h"
+
+namespace vdbdither {
+
+using openvdb::Coord;
+using openvdb::FloatTree;
+using openvdb::Vec3s;
+using openvdb::Vec3STree;
+
+namespace {
+
+using NormalAccessor = openvdb::tree::ValueAccessor<const Vec3STree, false>;
+
+/// Eq. (5).
+float displacement(const ShapeDither& dither, const Vec3s& normal, const Coord& ijk) {
+  const double half_diameter = halfVoxelDiameter(normal, dither.pitch_mm);
+  return static_cast<float>(dither.amplitude * half_diameter * (double{dither.mask(ijk)} - 0.5));
+}
+
+/// f on ∂V: active at its voxels. A leaf's transient data holds the bits of its greatest |f|.
+FloatTree surfaceDisplacements(const ShapeDither& dither, const FloatTree& surface,
+                               const Vec3STree* normals, ZRange layers, ZRange valid) {
+  FloatTree displacements(0.0F);
+  addLeaves(displacements, leavesIn(surface, layers), [&] {
+    return [&, surface_voxels = SurfaceVoxels(surface, valid),
+            gradient = LeafNormals(surface, dither.pitch_mm, valid),
+            given = normals ? std::optional<NormalAccessor>(*normals)
+                            : std::nullopt](const FloatLeaf& leaf) mutable {
+      const LeafBits bits = surface_voxels(leaf);
+      if (bits == no_bits) return std::unique_ptr<FloatLeaf>();
+
+      if (!given) gradient.visit(leaf);
+      auto made = std::make_unique<FloatLeaf>(leaf.origin(), 0.0F);
+      float greatest = 0;
+      forEachBit(bits, [&](unsigned offset) {
+        const Coord ijk = leaf.offsetToGlobalCoord(offset);
+        const Vec3s normal = given                    ? given->getValue(ijk)
+                             : leaf.isValueOn(offset) ? gradient.normal(offset)
+                                                      : Vec3s(0.0F);
+        const float f = displacement(dither, normal, ijk);
+        greatest = std::max(greatest, std::abs(f));
+        made->setValueOn(offset, f);
+      });
+      made->setTransientData(std::bit_cast<std::uint32_t>(greatest));
+      return made;
+    };
+  });
+  return displacements;
+}
+
+/// What stands between a voxel's d and its f, one leaf at a time: `visit` returns a bound of |f| in
+/// the leaf, `operator()` f at an active voxel.
+class AtClosest {
+ public:
+  AtClosest(const FloatTree& displacements, const SearchDisk& disk)
+      : closest_(displacements, disk) {}
+
+  float visit(const FloatLeaf& leaf) {
+    float greatest = 0;
+    if (!closest_.visit(leaf.origin())) return greatest;
+    for (const FloatLeaf* near : closest_.leaves()) {
+      if (near) greatest = std::max(greatest, std::bit_cast<float>(near->transientData()));
+    }
+    return greatest;
+  }
+
+  float operator()(unsigned offset, float) const {
+    const auto found = closest_(offset);
+    return found ? found->value : 0.0F;
+  }
+
+ private:
+  ClosestSurfaceVoxel closest_;
+};
+
+class AtFootOrVoxel {
+ public:
+  AtFootOrVoxel(const ShapeDither& dither, const Vec3STree& normals)
+      : dither_(dither), normals_(normals) {}
+
+  /// F, and a little for the rounding of normals and f.
+  float visit(const FloatLeaf& leaf) {
+    leaf_ = &leaf;
+    return static_cast<float>(dither_.largestDisplacementMm() * (1 + 1e-6));
+  }
+
+  float operator()(unsigned offset, float d) {
+    Coord ijk = leaf_->offsetToGlobalCoord(offset);
+    const Vec3s normal = normals_.getValue(ijk);
+    if (dither_.at == DitherAt::voxel) return displacement(dither_, normal, ijk);
+    for (int axis = 0; axis < 3; ++axis) {
+      ijk[axis] +=
+          static_cast<int>(std::floor(0.5 - double{d} * normal[axis] / dither_.pitch_mm[axis]));
+    }
+    return displacement(dither_, normals_.getValue(ijk), ijk);
+  }
+
+ private:
+  const ShapeDither& dither_;
+  NormalAccessor normals_;
+  const FloatLeaf* leaf_ = nullptr;
+};
+
+/// No displacement: plain voxelization.
+struct Nowhere {
+  float visit(const FloatLeaf&) { return 0; }
+  float operator()(unsigned, float) { return 0; }
+};
+
+ZRange grownWithin(ZRange core, int layers, ZRange valid) {
+  return intersection({core.begin - layers, core.end + layers}, valid);
+}
+
+}  // namespace
+
+openvdb::FloatGrid::Ptr makeDisplacedGrid(const openvdb::FloatGrid& surface) {
+  auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(surface.copyGridWithNewTree());
+  grid->setName("displaced");
+  grid->setTransform(surface.transform().copy());
+  return grid;
+}
+
+ShapeDither::Layers ShapeDither::reach(bool normals_given) const {
+  if (amplitude == 0) return {};
+  Layers layers;
+  if (at == DitherAt::closest) layers.normals = SearchDisk(pitch_mm, searchRadiusMm()).halo().z();
+  if (at == DitherAt::foot)
+    layers.normals = static_cast<int>(std::ceil(largestDisplacementMm() / pitch_mm.z() + 0.5));
+  // One more for the neighbours: those that make a surface voxel, and those of the gradient.
+  if (at == DitherAt::closest || !normals_given) layers.surface = layers.normals + 1;
+  return layers;
+}
+
+ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
+                                     const openvdb::Vec3SGrid* normals, ZRange core, ZRange valid,
+                                     bool with_displaced) const {
+  const std::vector<const FloatLeaf*> leaves = leavesIn(surface.tree(), core);
+  std::vector<SolidLeaf> printed(leaves.size());
+  const auto displaced = with_displaced ? makeDisplacedGrid(surface) : nullptr;
+  if (displaced) displaced->setTree(std::make_shared<FloatTree>(surface.tree()));
+
+  const auto decide = [&](const auto& make_reader) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size()), [&](const auto& range) {
+      auto f = make_reader();
+      for (std::size_t n = range.begin(); n != range.end(); ++n) {
+        const FloatLeaf& leaf = *leaves[n];
+        const float* distances = leaf.buffer().data();
+        const std::uint8_t within = rowWithin(leaf.origin().z(), core);
+        const float bound = f.visit(leaf);
+        FloatLeaf* moved = displaced ? displaced->tree().probeLeaf(leaf.origin()) : nullptr;
+
+        LeafBits inside = insideBits(leaf, within);
+        LeafBits undecided =
+            bitsWhere(distances, [&](float d) { return moved || std::abs(d) <= bound; });
+        for (unsigned x = 0; x < 8; ++x) {
+          undecided[x] &= leaf.getValueMask().getWord<std::uint64_t>(x) & everyRow(within);
+        }
+        forEachBit(undecided, [&](unsigned offset) {
+          const float d = distances[offset] + f(offset, distances[offset]);
+          const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
+          inside[offset / 64] = d < 0 ? inside[offset / 64] | bit : inside[offset / 64] & ~bit;
+          if (moved) moved->setValueOnly(offset, d);
+        });
+        printed[n] = {leaf.origin(), inside};
+      }
+    });
+  };
+
+  const int halo = reach(true).normals;
+  const Vec3STree* given = normals ? &normals->tree() : nullptr;
+  if (amplitude == 0) {
+    decide([] { return Nowhere(); });
+  } else if (at == DitherAt::closest) {
+    const SearchDisk disk(pitch_mm, searchRadiusMm());
+    const FloatTree displacements =
+        surfaceDisplacements(*this, surface.tree(), given, grownWithin(core, halo, valid), valid);
+    decide([&] { return AtClosest(displacements, disk); });
+  } else {
+    const auto made =
+        given ? nullptr : outwardNormals(surface, pitch_mm, grownWithin(core, halo, valid), valid);
+    decide([&] { return AtFootOrVoxel(*this, given ? *given : made->tree()); });
+  }
+
+  return {makeSolidGrid(surface.transform(), printed, insideTiles(surface.tree(), core)),
+          displaced};
+}
+
+}  // namespace vdbdither

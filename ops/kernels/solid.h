@@ -1,0 +1,31 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <openvdb/openvdb.h>
+
+#include "ops/kernels/leaf_bits.h"
+#include "vdbdither/lattice.h"
+
+namespace vdbdither {
+
+/// The printed voxels of one leaf.
+struct SolidLeaf {
+  openvdb::Coord origin;
+  LeafBits inside;
+};
+
+/// The tiles of `surface` that lie inside (d < 0), cut to `layers`.
+std::vector<openvdb::CoordBBox> insideTiles(const openvdb::FloatTree& surface, ZRange layers);
+
+/// An empty grid `solid`: active and true inside, false outside.
+openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform);
+
+/// The grid `solid` of some leaves and of boxes filled whole, which do not meet the leaves.
+/// Canonical: its topology is as coarse as its values allow, whatever the topology it came from.
+openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform,
+                                     std::span<const SolidLeaf> leaves,
+                                     std::span<const openvdb::CoordBBox> boxes);
+
+}  // namespace vdbdither

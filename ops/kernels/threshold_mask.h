@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <openvdb/openvdb.h>
+
+namespace vdbdither {
+
+/// Thresholds M in (0, 1), a function of the absolute voxel index alone.
+class ThresholdMask {
+ public:
+  /// A tile repeated in all directions. `size`: voxels per axis; `values`: size.x · size.y · size.z
+  /// of them, z fastest.
+  ThresholdMask(const openvdb::Coord& size, std::vector<float> values);
+
+  /// The tile of a grid `mask`: active voxels from (0, 0, 0) on that fill a box. Throws DataError
+  /// where they do not, or where a value is not within (0, 1).
+  explicit ThresholdMask(const openvdb::FloatGrid& grid);
+
+  /// White noise: uniform and independent per voxel, a hash of index and seed.
+  static ThresholdMask whiteNoise(std::uint64_t seed);
+
+  /// The same threshold everywhere.
+  static ThresholdMask constant(float value) { return {openvdb::Coord(1), {value}}; }
+
+  [[nodiscard]] std::size_t bytes() const { return values_.size() * sizeof(float); }
+
+  /// M at an absolute index, negative ones included.
+  [[nodiscard]] float operator()(const openvdb::Coord& ijk) const;
+
+ private:
+  ThresholdMask() = default;
+
+  openvdb::Coord size_;
+  std::vector<float> values_;  ///< empty: white noise
+  std::uint64_t seed_ = 0;
+};
+
+}  // namespace vdbdither

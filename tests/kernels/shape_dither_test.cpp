@@ -1,0 +1,297 @@
+#include "ops/kernels/shape_dither.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "ops/kernels/gradient.h"
+#include "ops/kernels/voxel_diameter.h"
+#include "tests/support/dither_reference.h"
+
+namespace vdbdither {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using openvdb::Vec3d;
+
+const std::vector<Vec3d> lattices{
+    {0.042, 0.084, 0.022}, {0.04233, 0.08467, 0.027}, {0.05, 0.05, 0.05}};
+
+struct Shape {
+  const char* name;
+  test::Distance distance;
+  Vec3d extent;
+};
+
+const std::vector<Shape> shapes{
+    {"sphere", test::sphere({0.013, -0.02, 0.007}, 0.4), Vec3d(0.43)},
+    {"tilted box", test::box(Vec3d(0.0), {0.35, 0.3, 0.2}, {12, 25, 31}), Vec3d(0.5)},
+    {"torus", test::torus({0.01, 0.01, 0}, 0.35, 0.15), {0.52, 0.52, 0.16}},
+    {"thin plate",
+     test::box({0.001, 0.002, 0.003}, {0.4, 0.4, 0.03}, {5, -4, 0}),
+     {0.45, 0.45, 0.12}},
+};
+
+/// A tile of ranks in random order: every threshold (rank + ½) / n once.
+ThresholdMask permutationMask(int size) {
+  std::vector<float> values(static_cast<std::size_t>(size * size * size));
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    values[n] = (static_cast<float>(n) + 0.5F) / static_cast<float>(values.size());
+  }
+  std::shuffle(values.begin(), values.end(), std::mt19937(11));
+  return {Coord(size), values};
+}
+
+double bandFor(const ShapeDither& dither) {
+  return dither.largestDisplacementMm() + dither.pitch_mm.length();
+}
+
+/// d′ of every active voxel by the equations, in double precision; NaN elsewhere.
+test::Volume<double> referenceDisplaced(const ShapeDither& dither, const FloatGrid& surface,
+                                        const CoordBBox& box) {
+  const Vec3d& pitch_mm = dither.pitch_mm;
+  const auto d = test::dense(surface, box);
+  const auto surface_voxels = test::listed(test::surfaceVoxels(test::plainVoxels(d)));
+  const auto f = [&](const Coord& u) {
+    if (!surface.tree().isValueOn(u)) return 0.0;
+    const double k_D = test::halfDiameter(test::gradientNormal(surface, u, pitch_mm), pitch_mm);
+    return dither.amplitude * k_D * (double{dither.mask(u)} - 0.5);
+  };
+  test::Volume<double> displaced(box, std::nan(""));
+  for (auto v = box.begin(); v; ++v) {
+    if (!surface.tree().isValueOn(*v)) continue;
+    if (dither.at == DitherAt::voxel) {
+      displaced[*v] = double{d[*v]} + f(*v);
+    } else if (dither.at == DitherAt::foot) {
+      const Vec3d foot_mm =
+          (*v).asVec3d() * pitch_mm - double{d[*v]} * test::gradientNormal(surface, *v, pitch_mm);
+      displaced[*v] = double{d[*v]} + f(Coord::round(foot_mm / pitch_mm));
+    } else {
+      const auto closest =
+          test::closestSurfaceVoxel(surface_voxels, *v, pitch_mm, dither.searchRadiusMm());
+      displaced[*v] = double{d[*v]} + (closest ? f(*closest) : 0.0);
+    }
+  }
+  return displaced;
+}
+
+void compareWithReference(const ShapeDither& dither, const Shape& shape) {
+  const Lattice lattice = test::latticeAround(dither.pitch_mm, shape.extent, 0.15);
+  const auto surface = test::sampled(shape.distance, lattice, bandFor(dither));
+  const auto expected = referenceDisplaced(dither, *surface, lattice.box);
+  const auto result = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), true);
+  const auto plain = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), false);
+  EXPECT_FALSE(plain.displaced);
+
+  int displaced = 0;
+  for (auto v = lattice.box.begin(); v; ++v) {
+    const float d = surface->tree().getValue(*v);
+    const bool active = surface->tree().isValueOn(*v);
+    const bool printed = result.solid->tree().getValue(*v);
+    ASSERT_EQ(printed, active ? expected[*v] < 0 : d < 0)
+        << *v << " d = " << d << " d' = " << expected[*v];
+    ASSERT_EQ(printed, plain.solid->tree().getValue(*v)) << *v;
+    ASSERT_EQ(printed, result.solid->tree().isValueOn(*v)) << *v;
+    ASSERT_NEAR(result.displaced->tree().getValue(*v), active ? expected[*v] : d, 1e-7) << *v;
+    displaced += printed != (d < 0);
+  }
+  EXPECT_GT(displaced, 10);
+}
+
+TEST(ShapeDither, EqualsTheEquationsInDoublePrecision) {
+  const ThresholdMask mask = permutationMask(16);
+  for (const Vec3d& pitch_mm : lattices) {
+    for (const Shape& shape : shapes) {
+      for (const DitherAt at : {DitherAt::closest, DitherAt::foot, DitherAt::voxel}) {
+        for (const double amplitude : {2.0, 4.0}) {
+          SCOPED_TRACE(std::string(shape.name) + " at " + std::to_string(static_cast<int>(at)));
+          compareWithReference({pitch_mm, amplitude, at, mask}, shape);
+        }
+      }
+    }
+  }
+}
+
+TEST(ShapeDither, EqualsTheEquationsAtTheLargestAmplitudeAndWithWhiteNoise) {
+  for (const Shape& shape : shapes)
+    compareWithReference({lattices[0], 8, DitherAt::closest, ThresholdMask::whiteNoise(3)}, shape);
+}
+
+TEST(ShapeDither, MakesTheSameOfGivenNormalsAsOfItsOwn) {
+  const Lattice lattice = test::latticeAround(lattices[0], Vec3d(0.5), 0.15);
+  for (const DitherAt at : {DitherAt::closest, DitherAt::foot, DitherAt::voxel}) {
+    const ShapeDither dither{lattice.pitch_mm, 4, at, permutationMask(16)};
+    const auto surface = test::sampled(shapes[1].distance, lattice, bandFor(dither));
+    const auto normals =
+        outwardNormals(*surface, lattice.pitch_mm, lattice.layers(), lattice.layers());
+    const auto with = dither.run(*surface, normals.get(), lattice.layers(), lattice.layers(), true);
+    const auto without = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), true);
+    EXPECT_EQ(test::dense(*with.displaced, lattice.box),
+              test::dense(*without.displaced, lattice.box));
+    EXPECT_TRUE(with.solid->tree().hasSameTopology(without.solid->tree()));
+  }
+}
+
+TEST(ShapeDither, AtTheVoxelIsTheThresholdedTonalValue) {
+  for (const Vec3d& pitch_mm : lattices) {
+    for (const double amplitude : {2.0, 4.0}) {
+      const ShapeDither dither{pitch_mm, amplitude, DitherAt::voxel, permutationMask(16)};
+      const Lattice lattice = test::latticeAround(pitch_mm, Vec3d(0.5), 0.15);
+      const auto surface = test::sampled(shapes[1].distance, lattice, bandFor(dither));
+      const auto result = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), false);
+      for (auto voxel = surface->cbeginValueOn(); voxel; ++voxel) {
+        const Coord v = voxel.getCoord();
+        const double k_D =
+            test::halfDiameter(test::gradientNormal(*surface, v, pitch_mm), pitch_mm);
+        if (k_D == 0) continue;
+        const double tone =
+            std::clamp(-double{*voxel} / (amplitude * k_D), -1.0, 1.0) + 0.5;             // (7)
+        ASSERT_EQ(tone > double{dither.mask(v)}, result.solid->tree().getValue(v)) << v;  // (1)
+      }
+    }
+  }
+}
+
+/// A wall that fills all below `height` voxels along `axis`, over 16 × 16 columns and more around
+/// them.
+double meanHeight(const ShapeDither& dither, int axis, double height) {
+  const int level = static_cast<int>(std::floor(height));
+  CoordBBox columns(Coord(0), Coord(15));
+  columns.min()[axis] = level - 12;
+  columns.max()[axis] = level + 12;
+  Lattice lattice{dither.pitch_mm, Vec3d(0.0), columns};
+  for (int beside : {(axis + 1) % 3, (axis + 2) % 3}) {
+    lattice.box.min()[beside] -= 12;
+    lattice.box.max()[beside] += 12;
+  }
+  const double pitch_mm = dither.pitch_mm[axis];
+  const auto surface =
+      test::sampled([&](const Vec3d& at) { return at[axis] - (height - 0.5) * pitch_mm; }, lattice,
+                    bandFor(dither));
+  const auto result = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), false);
+  double printed = 0;
+  for (auto v = columns.begin(); v; ++v) printed += result.solid->tree().getValue(*v) ? 1 : 0;
+  return printed / 256 + columns.min()[axis];
+}
+
+TEST(ShapeDither, KeepsTheMeanHeightOfAnAxisParallelPlane) {
+  const ThresholdMask mask = permutationMask(16);
+  for (const DitherAt at : {DitherAt::closest, DitherAt::foot, DitherAt::voxel}) {
+    for (const double amplitude : {2.0, 4.0}) {
+      for (int axis = 0; axis < 3; ++axis) {
+        for (const double offset : {0.0, 0.13, 0.37, 0.5, 0.71, 0.94}) {
+          const ShapeDither dither{lattices[0], amplitude, at, mask};
+          // Sixteen planes see every threshold of the mask once in each layer.
+          double error = 0;
+          for (int level = -3; level < 13; ++level)
+            error += meanHeight(dither, axis, level + offset) - (level + offset);
+          EXPECT_NEAR(error / 16, 0, 0.01)
+              << "amplitude " << amplitude << " axis " << axis << " offset " << offset;
+        }
+      }
+    }
+  }
+}
+
+TEST(ShapeDither, ShiftsTheMeanHeightByAQuarterVoxelAtTheConstantOne) {
+  const ShapeDither dither{lattices[0], 1, DitherAt::closest, permutationMask(16)};
+  double largest = 0;
+  for (const double offset : {0.25, 0.75}) {
+    double error = 0;
+    for (int level = 0; level < 16; ++level)
+      error += meanHeight(dither, 2, level + offset) - (level + offset);
+    largest = std::max(largest, std::abs(error / 16));
+  }
+  EXPECT_NEAR(largest, 0.25, 0.02);
+}
+
+/// The voxels printed of a shape.
+struct Printed {
+  test::Voxels plain;
+  test::Voxels dithered;
+};
+
+Printed printed(const ShapeDither& dither, const Shape& shape) {
+  const Lattice lattice = test::latticeAround(dither.pitch_mm, shape.extent, 0.3);
+  const auto surface = test::sampled(shape.distance, lattice, bandFor(dither));
+  const auto result = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), false);
+  return {test::plainVoxels(test::dense(*surface, lattice.box)),
+          test::dense(*result.solid, lattice.box)};
+}
+
+const Shape ball{"ball", test::sphere({0.013, -0.02, 0.007}, 1.2), Vec3d(1.2)};
+const Shape ring{"ring", test::torus({0.01, 0.01, 0}, 0.8, 0.4), {1.2, 1.2, 0.4}};
+
+TEST(ShapeDither, LeavesNoFloatingVoxelsAtTheClosestSurfaceVoxelOrTheFoot) {
+  for (const Vec3d& pitch_mm : lattices) {
+    for (const Shape& shape : {ball, ring}) {
+      for (const DitherAt at : {DitherAt::closest, DitherAt::foot}) {
+        const Printed voxels = printed({pitch_mm, 4, at, ThresholdMask::whiteNoise(1)}, shape);
+        EXPECT_EQ(test::components(voxels.plain), 1);
+        EXPECT_EQ(test::components(voxels.dithered), 1)
+            << shape.name << " at " << static_cast<int>(at);
+      }
+    }
+  }
+}
+
+TEST(ShapeDither, LeavesFloatingVoxelsAtTheVoxelItself) {
+  EXPECT_GT(
+      test::components(
+          printed({lattices[0], 4, DitherAt::voxel, ThresholdMask::whiteNoise(1)}, ball).dithered),
+      100);
+}
+
+TEST(ShapeDither, AtTheConstantTwoItMattersLittleWhereTheMaskIsRead) {
+  for (const Vec3d& pitch_mm : lattices) {
+    const ThresholdMask mask = permutationMask(16);
+    const Printed voxel = printed({pitch_mm, 2, DitherAt::voxel, mask}, ball);
+    const Printed foot = printed({pitch_mm, 2, DitherAt::foot, mask}, ball);
+    const Printed closest = printed({pitch_mm, 2, DitherAt::closest, mask}, ball);
+    const int moved = test::differences(voxel.dithered, voxel.plain);
+    std::cout << moved << " " << test::differences(voxel.dithered, foot.dithered) << " "
+              << test::differences(voxel.dithered, closest.dithered) << "\n";
+    EXPECT_LT(test::differences(voxel.dithered, foot.dithered), moved / 1000);
+    EXPECT_LT(test::differences(voxel.dithered, closest.dithered), moved / 10);
+    EXPECT_EQ(test::components(voxel.dithered), 1);
+  }
+}
+
+TEST(ShapeDither, AtTheConstantFourAFifthOfTheBandDependsOnWhereTheMaskIsRead) {
+  const ThresholdMask mask = permutationMask(16);
+  const Printed voxel = printed({lattices[0], 4, DitherAt::voxel, mask}, ball);
+  const Printed closest = printed({lattices[0], 4, DitherAt::closest, mask}, ball);
+  const int moved = test::differences(voxel.dithered, voxel.plain);
+  std::cout << moved << " " << test::differences(voxel.dithered, closest.dithered) << "\n";
+  EXPECT_GT(test::differences(voxel.dithered, closest.dithered), moved / 5);
+}
+
+TEST(ShapeDither, IsPlainVoxelizationWithoutAmplitude) {
+  const Printed voxels = printed({lattices[0], 0, DitherAt::closest, permutationMask(8)}, ring);
+  EXPECT_EQ(voxels.plain, voxels.dithered);
+}
+
+TEST(HalfVoxelDiameter, IsTheDistanceToTheBoundaryAlongTheNormal) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  for (const Vec3d& pitch_mm : lattices) {
+    for (int n = 0; n < 1000; ++n) {
+      const openvdb::Vec3s along(Vec3d(normal(random), normal(random), normal(random)).unit());
+      const Vec3d exit_voxels = Vec3d(along) * halfVoxelDiameter(along, pitch_mm) / pitch_mm;
+      const double farthest = std::max(
+          {std::abs(exit_voxels.x()), std::abs(exit_voxels.y()), std::abs(exit_voxels.z())});
+      ASSERT_NEAR(farthest, 0.5, 1e-12);
+      ASSERT_LE(halfVoxelDiameter(along, pitch_mm), pitch_mm.length() / 2 * (1 + 1e-7));
+    }
+    EXPECT_EQ(halfVoxelDiameter(openvdb::Vec3s(0.0F), pitch_mm), 0);
+    EXPECT_DOUBLE_EQ(halfVoxelDiameter({0, 0, -1}, pitch_mm), pitch_mm.z() / 2);
+  }
+}
+
+}  // namespace
+}  // namespace vdbdither

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "tests/support/volumes.h"
+
+namespace vdbdither::test {
+
+/// The equations of the paper once more, in double precision over dense arrays, as plainly as they
+/// can be written.
+
+/// V = { v : d(v) < 0 }.
+Voxels plainVoxels(const Volume<float>& d);
+
+/// ∂V: the voxels of V with a 6-neighbour outside V; what lies outside the box is outside V.
+Voxels surfaceVoxels(const Voxels& V);
+
+/// (4): the voxel of ∂V closest to `v` in mm, ties to the smallest (k, j, i); none beyond
+/// `radius_mm`.
+std::optional<openvdb::Coord> closestSurfaceVoxel(const std::vector<openvdb::Coord>& surface_voxels,
+                                                  const openvdb::Coord& v,
+                                                  const openvdb::Vec3d& pitch_mm, double radius_mm);
+
+std::vector<openvdb::Coord> listed(const Voxels& voxels);
+
+/// The unit gradient: central differences, one-sided beside an inactive voxel, zero between two.
+openvdb::Vec3d gradientNormal(const openvdb::FloatGrid& surface, const openvdb::Coord& v,
+                              const openvdb::Vec3d& pitch_mm);
+
+/// (6).
+double halfDiameter(const openvdb::Vec3d& n, const openvdb::Vec3d& pitch_mm);
+
+}  // namespace vdbdither::test

@@ -1,0 +1,180 @@
+#include "tests/support/volumes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <openvdb/tools/Prune.h>
+
+namespace vdbdither::test {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using openvdb::Vec3d;
+using openvdb::Vec3s;
+using openvdb::Vec3SGrid;
+
+Distance sphere(const Vec3d& centre, double radius) {
+  return [=](const Vec3d& at) { return (at - centre).length() - radius; };
+}
+
+Distance box(const Vec3d& centre, const Vec3d& half, const Vec3d& degrees) {
+  openvdb::Mat3d turn = openvdb::Mat3d::identity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto about = static_cast<openvdb::math::Axis>(axis);
+    turn = openvdb::math::rotation<openvdb::Mat3d>(about, -degrees[axis] * std::numbers::pi / 180) *
+           turn;
+  }
+  const openvdb::Mat3d back = turn.transpose();
+  return [=](const Vec3d& at) {
+    const Vec3d local = back * (at - centre);
+    Vec3d beyond;
+    for (int axis = 0; axis < 3; ++axis) beyond[axis] = std::abs(local[axis]) - half[axis];
+    const double inside = std::min(0.0, std::max({beyond.x(), beyond.y(), beyond.z()}));
+    return openvdb::math::maxComponent(beyond, Vec3d(0.0)).length() + inside;
+  };
+}
+
+Distance torus(const Vec3d& centre, double ring_radius, double tube_radius) {
+  return [=](const Vec3d& at) {
+    const Vec3d local = at - centre;
+    return std::hypot(std::hypot(local.x(), local.y()) - ring_radius, local.z()) - tube_radius;
+  };
+}
+
+Lattice latticeAround(const Vec3d& pitch_mm, const Vec3d& extent_mm, double padding_mm) {
+  Coord reach;
+  for (int axis = 0; axis < 3; ++axis) {
+    reach[axis] = static_cast<int>(std::ceil((extent_mm[axis] + padding_mm) / pitch_mm[axis]));
+  }
+  return {pitch_mm, Vec3d(0.0), CoordBBox(Coord(0) - reach, reach)};
+}
+
+FloatGrid::Ptr sampled(const Distance& distance, const Lattice& lattice, double band_mm) {
+  const auto band = static_cast<float>(band_mm);
+  auto grid = FloatGrid::create(band);
+  grid->setName("surface");
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  auto map = std::make_shared<openvdb::math::ScaleMap>(lattice.pitch_mm);
+  grid->setTransform(std::make_shared<openvdb::math::Transform>(map));
+  grid->transform().postTranslate(lattice.origin_mm);
+  auto accessor = grid->getAccessor();
+  for (auto ijk = lattice.box.begin(); ijk; ++ijk) {
+    const auto d = static_cast<float>(distance(lattice.position(*ijk)));
+    if (std::abs(d) <= band) {
+      accessor.setValueOn(*ijk, d);
+    } else {
+      accessor.setValueOff(*ijk, d < 0 ? -band : band);
+    }
+  }
+  openvdb::tools::prune(grid->tree());
+  return grid;
+}
+
+Schema schemaOf(const Lattice& lattice, Grids grids) {
+  Schema schema;
+  schema.lattice = lattice;
+  schema.grids = std::move(grids);
+  return schema;
+}
+
+namespace {
+
+template <typename T, typename GridType>
+Volume<T> denseOf(const GridType& grid, const CoordBBox& box) {
+  Volume<T> volume(box, T(0));
+  auto accessor = grid.getConstAccessor();
+  for (auto ijk = box.begin(); ijk; ++ijk) volume[*ijk] = accessor.getValue(*ijk);
+  return volume;
+}
+
+}  // namespace
+
+Voxels dense(const openvdb::BoolGrid& grid, const CoordBBox& box) {
+  return denseOf<char>(grid, box);
+}
+Volume<float> dense(const FloatGrid& grid, const CoordBBox& box) {
+  return denseOf<float>(grid, box);
+}
+Volume<Vec3s> dense(const Vec3SGrid& grid, const CoordBBox& box) {
+  return denseOf<Vec3s>(grid, box);
+}
+
+int differences(const Voxels& a, const Voxels& b) {
+  int count = 0;
+  for (auto ijk = a.box().begin(); ijk; ++ijk) count += a[*ijk] != b[*ijk];
+  return count;
+}
+
+int components(Voxels voxels) {
+  int count = 0;
+  std::vector<Coord> open;
+  for (auto start = voxels.box().begin(); start; ++start) {
+    if (!voxels[*start]) continue;
+    ++count;
+    voxels[*start] = 0;
+    open.push_back(*start);
+    while (!open.empty()) {
+      const Coord ijk = open.back();
+      open.pop_back();
+      for (auto near = CoordBBox(ijk.offsetBy(-1), ijk.offsetBy(1)).begin(); near; ++near) {
+        if (!voxels.at(*near, 0)) continue;
+        voxels[*near] = 0;
+        open.push_back(*near);
+      }
+    }
+  }
+  return count;
+}
+
+Grids runWhole(Filter& filter, const Schema& schema) {
+  filter.plan(schema);
+  Slab slab{schema.lattice.layers(), schema.lattice.layers(), {}};
+  for (const Read& read : filter.reads()) slab.grids[read.grid] = schema.grids.at(read.grid);
+  return filter.run(slab);
+}
+
+namespace {
+
+/// A copy of `grid` in which every voxel of every leaf outside `valid` is active and holds rubbish.
+template <typename GridType>
+GridConstPtr spoiled(const GridType& grid, ZRange valid,
+                     const typename GridType::ValueType& rubbish) {
+  auto copy = grid.deepCopy();
+  for (auto leaf = copy->tree().beginLeaf(); leaf; ++leaf) {
+    for (openvdb::Index n = 0; n < 512; ++n) {
+      if (!valid.contains(leaf->offsetToGlobalCoord(n).z())) leaf->setValueOn(n, rubbish);
+    }
+  }
+  return copy;
+}
+
+GridConstPtr spoiled(const GridConstPtr& grid, ZRange valid) {
+  if (const auto floats = openvdb::gridConstPtrCast<FloatGrid>(grid))
+    return spoiled(*floats, valid, -0.011F);
+  return spoiled(*openvdb::gridConstPtrCast<Vec3SGrid>(grid), valid, Vec3s(0.6F, 0.0F, -0.8F));
+}
+
+}  // namespace
+
+std::vector<std::pair<ZRange, Grids>> runInSlabs(Filter& filter, const Schema& schema, int height) {
+  filter.plan(schema);
+  const ZRange layers = schema.lattice.layers();
+  std::vector<std::pair<ZRange, Grids>> results;
+  for (int begin = alignedToLeaves(layers).begin; begin < layers.end; begin += height) {
+    Slab slab;
+    slab.core = intersection({begin, begin + height}, layers);
+    slab.valid = slab.core;
+    for (const Read& read : filter.reads()) {
+      const ZRange reach = intersection(
+          {slab.core.begin - read.reach.below, slab.core.end + read.reach.above}, layers);
+      slab.valid = {std::min(slab.valid.begin, reach.begin), std::max(slab.valid.end, reach.end)};
+      slab.grids[read.grid] = spoiled(schema.grids.at(read.grid), reach);
+    }
+    results.emplace_back(slab.core, filter.run(slab));
+  }
+  return results;
+}
+
+}  // namespace vdbdither::test

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include <openvdb/openvdb.h>
+
+#include "vdbdither/operator.h"
+#include "vdbdither/schema.h"
+#include "vdbdither/slab.h"
+
+namespace vdbdither::test {
+
+/// A signed distance in mm at a position in mm, < 0 inside.
+using Distance = std::function<double(const openvdb::Vec3d&)>;
+
+Distance sphere(const openvdb::Vec3d& centre, double radius);
+
+/// A box with half its edges in `half`, turned about x, then y, then z (degrees).
+Distance box(const openvdb::Vec3d& centre, const openvdb::Vec3d& half,
+             const openvdb::Vec3d& degrees = openvdb::Vec3d(0.0));
+
+/// A torus around an axis parallel to z.
+Distance torus(const openvdb::Vec3d& centre, double ring_radius, double tube_radius);
+
+/// The lattice over the box from -extent_mm to extent_mm, plus `padding_mm`.
+Lattice latticeAround(const openvdb::Vec3d& pitch_mm, const openvdb::Vec3d& extent_mm,
+                      double padding_mm);
+
+/// `surface` on a lattice: active where |d| ≤ `band_mm`, ±`band_mm` elsewhere and in tiles.
+openvdb::FloatGrid::Ptr sampled(const Distance& distance, const Lattice& lattice, double band_mm);
+
+/// A schema of these grids on a lattice.
+Schema schemaOf(const Lattice& lattice, Grids grids);
+
+/// A dense array over a box of voxels, for references that shall be plain.
+template <typename T>
+class Volume {
+ public:
+  Volume(const openvdb::CoordBBox& box, T value) : box_(box), values_(box.volume(), value) {}
+
+  [[nodiscard]] const openvdb::CoordBBox& box() const { return box_; }
+  T& operator[](const openvdb::Coord& ijk) { return values_[index(ijk)]; }
+  const T& operator[](const openvdb::Coord& ijk) const { return values_[index(ijk)]; }
+  [[nodiscard]] T at(const openvdb::Coord& ijk, T outside) const {
+    return box_.isInside(ijk) ? (*this)[ijk] : outside;
+  }
+  friend bool operator==(const Volume&, const Volume&) = default;
+
+ private:
+  [[nodiscard]] std::size_t index(const openvdb::Coord& ijk) const {
+    const openvdb::Coord at = ijk - box_.min();
+    const openvdb::Coord size = box_.dim();
+    return static_cast<std::size_t>((at.x() * size.y() + at.y()) * size.z() + at.z());
+  }
+
+  openvdb::CoordBBox box_;
+  std::vector<T> values_;
+};
+
+/// Which voxels of a set are in it.
+using Voxels = Volume<char>;
+
+/// The values of `grid` over `box`.
+Voxels dense(const openvdb::BoolGrid& grid, const openvdb::CoordBBox& box);
+Volume<float> dense(const openvdb::FloatGrid& grid, const openvdb::CoordBBox& box);
+Volume<openvdb::Vec3s> dense(const openvdb::Vec3SGrid& grid, const openvdb::CoordBBox& box);
+
+/// Where two volumes over one box differ.
+int differences(const Voxels& a, const Voxels& b);
+
+/// How many groups of voxels there are that touch by faces, edges or corners.
+int components(Voxels voxels);
+
+/// What `filter`, planned on these grids, makes of the whole lattice in one slab.
+Grids runWhole(Filter& filter, const Schema& schema);
+
+/// What it makes slab by slab: each of `height` layers, cut at multiples of eight. Every slab gets
+/// its own copy of what the filter declares to read, and nothing but rubbish beyond its reach.
+std::vector<std::pair<ZRange, Grids>> runInSlabs(Filter& filter, const Schema& schema, int height);
+
+}  // namespace vdbdither::test
