@@ -23,6 +23,9 @@ namespace vdbdither {
 inline constexpr std::size_t uuid_offset = 21;
 inline constexpr std::size_t uuid_size = 36;
 
+/// What stands for the UUID while the digest is taken.
+inline constexpr std::string_view neutral_uuid = "00000000-0000-0000-0000-000000000000";
+
 /// The digest in the form of a UUID of version 8 (RFC 9562: vendor-specific), which tells it from
 /// OpenVDB's random ones.
 std::string uuidOf(const Digest::Value& value);

@@ -78,7 +78,7 @@ class FrameReader::Buffer : public std::streambuf {
     if (gptr() == egptr()) return false;
     if (static_cast<std::size_t>(egptr() - gptr()) >= uuid_offset + uuid_size) {
       uuid_.assign(gptr() + uuid_offset, uuid_size);
-      std::fill_n(gptr() + uuid_offset, uuid_size, '0');
+      neutral_uuid.copy(gptr() + uuid_offset, uuid_size);
     }
     return true;
   }

@@ -74,7 +74,7 @@ std::pair<std::string, std::string> digestAndUuid(std::istream& stream) {
     const auto size = static_cast<std::size_t>(stream.gcount());
     if (uuid.empty() && size >= uuid_offset + uuid_size) {
       uuid.assign(buffer.data() + uuid_offset, uuid_size);
-      std::fill_n(buffer.data() + uuid_offset, uuid_size, '0');
+      neutral_uuid.copy(buffer.data() + uuid_offset, uuid_size);
     }
     digest.update(buffer.data(), size);
   }
@@ -185,7 +185,7 @@ std::string archiveBytes(const VdbContents& contents, VdbCodec codec) {
   std::ostringstream stream(std::ios::binary);
   StreamArchive(contents, codec).writeTo(stream, false);
   std::string bytes = std::move(stream).str();
-  std::fill_n(bytes.begin() + uuid_offset, uuid_size, '0');
+  neutral_uuid.copy(bytes.data() + uuid_offset, uuid_size);
   Digest digest;
   digest.update(bytes.data(), bytes.size());
   const std::string uuid = uuidOf(digest.finish());

@@ -1,6 +1,7 @@
 #include <map>
 #include <optional>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 #include "io/frames.h"
@@ -36,7 +37,6 @@ class WriteOperator : public Sink {
           "VDB data is not for a terminal; name a file with -o, or pipe it into another operator");
     } else {
       frames_.emplace(dataOutput());
-      frames_->head(schema_);
     }
   }
 
@@ -44,6 +44,7 @@ class WriteOperator : public Sink {
 
   void write(const Slab& in) override {
     if (frames_) {
+      beginFrames();
       frames_->slab(in);
     } else {
       for (const auto& [name, grid] : in.grids) pieces_[name].push_back({grid, in.core});
@@ -51,7 +52,11 @@ class WriteOperator : public Sink {
   }
 
   void finish() override {
-    if (frames_) return frames_->end();
+    if (frames_) {
+      beginFrames();
+      frames_->end();
+      return;
+    }
     Grids grids;
     for (auto& [name, pieces] : pieces_) {
       grids[name] = pruned(joinLayers(pieces, schema_.lattice.layers()));
@@ -68,11 +73,16 @@ class WriteOperator : public Sink {
  private:
   [[nodiscard]] bool isPipe() const { return path_.empty() || path_ == "-"; }
 
+  void beginFrames() {
+    if (!std::exchange(begun_, true)) frames_->head(schema_);
+  }
+
   std::string path_;
   std::string codec_ = "blosc";
   bool overwrite_ = false;
   Schema schema_;
   std::optional<FrameWriter> frames_;
+  bool begun_ = false;
   std::optional<StagedOutput> output_;
   std::map<std::string, std::vector<Layers>> pieces_;
 };
