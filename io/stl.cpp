@@ -30,7 +30,8 @@ std::uint32_t littleEndian32(const char* at) {
 double littleEndianFloat(const char* at) { return std::bit_cast<float>(littleEndian32(at)); }
 
 /// Gives corners at the same position one vertex, in the order of first appearance. An
-/// open-addressing table of (hash, vertex), at most half full.
+/// open-addressing table of (hash, vertex), at most half full. Corners are looked up in batches, so
+/// that the memory they need is on its way before it is touched.
 class Welder {
  public:
   explicit Welder(const MeshFile& file) : file_(file), slots_(1024) {}
@@ -38,10 +39,18 @@ class Welder {
   void reserve(std::size_t triangles) { mesh_.triangles.reserve(triangles); }
 
   void addTriangle(const std::array<Vec3d, 3>& corners) {
-    mesh_.triangles.push_back({vertexAt(corners[0]), vertexAt(corners[1]), vertexAt(corners[2])});
+    for (const Vec3d& corner : corners) {
+      batch_[batched_] = corner + Vec3d(0.0);  // −0 becomes +0
+      hashes_[batched_] = hashOf(batch_[batched_]);
+      ++batched_;
+    }
+    if (batched_ == batch_.size()) weldBatch();
   }
 
-  Mesh take() { return std::move(mesh_); }
+  Mesh take() {
+    weldBatch();
+    return std::move(mesh_);
+  }
 
  private:
   static constexpr auto none = std::numeric_limits<std::uint32_t>::max();
@@ -59,37 +68,58 @@ class Welder {
     return static_cast<std::uint32_t>(hash >> 32);
   }
 
-  std::uint32_t vertexAt(Vec3d position) {
-    position += Vec3d(0.0);  // −0 becomes +0
-    const std::uint32_t hash = hashOf(position);
-    std::size_t at = hash & (slots_.size() - 1);
-    for (; slots_[at].vertex != none; at = (at + 1) & (slots_.size() - 1)) {
-      if (slots_[at].hash == hash && mesh_.vertices[slots_[at].vertex] == position) {
+  void weldBatch() {
+    for (std::size_t i = 0; i < batched_; ++i) __builtin_prefetch(&slots_[home(hashes_[i])]);
+    for (std::size_t i = 0; i < batched_; ++i) {
+      const Slot& slot = slots_[home(hashes_[i])];
+      if (slot.vertex != none) __builtin_prefetch(&mesh_.vertices[slot.vertex]);
+    }
+    for (std::size_t i = 0; i < batched_; i += 3) {
+      const std::uint32_t a = vertexAt(i);
+      const std::uint32_t b = vertexAt(i + 1);
+      mesh_.triangles.push_back({a, b, vertexAt(i + 2)});
+    }
+    batched_ = 0;
+  }
+
+  /// The vertex of corner `i` of the batch.
+  std::uint32_t vertexAt(std::size_t i) {
+    std::size_t at = home(hashes_[i]);
+    for (; slots_[at].vertex != none; at = next(at)) {
+      if (slots_[at].hash == hashes_[i] && mesh_.vertices[slots_[at].vertex] == batch_[i]) {
         return slots_[at].vertex;
       }
     }
-    if (mesh_.vertices.size() == none)
+    if (mesh_.vertices.size() == none) {
       file_.refuse("more than 4294967295 vertices; split the part");
+    }
     const auto vertex = static_cast<std::uint32_t>(mesh_.vertices.size());
-    slots_[at] = {hash, vertex};
-    mesh_.vertices.push_back(position);
+    slots_[at] = {hashes_[i], vertex};
+    mesh_.vertices.push_back(batch_[i]);
     if (mesh_.vertices.size() * 2 > slots_.size()) grow();
     return vertex;
   }
 
   void grow() {
-    std::vector<Slot> larger(slots_.size() * 2);
-    for (const Slot& slot : slots_) {
+    std::vector<Slot> before(slots_.size() * 2);
+    slots_.swap(before);
+    for (const Slot& slot : before) {
       if (slot.vertex == none) continue;
-      std::size_t at = slot.hash & (larger.size() - 1);
-      while (larger[at].vertex != none) at = (at + 1) & (larger.size() - 1);
-      larger[at] = slot;
+      std::size_t at = home(slot.hash);
+      while (slots_[at].vertex != none) at = next(at);
+      slots_[at] = slot;
     }
-    slots_.swap(larger);
   }
+
+  /// Where the search for a hash starts, and how it goes on.
+  [[nodiscard]] std::size_t home(std::uint32_t hash) const { return hash & (slots_.size() - 1); }
+  [[nodiscard]] std::size_t next(std::size_t at) const { return (at + 1) & (slots_.size() - 1); }
 
   const MeshFile& file_;
   std::vector<Slot> slots_;
+  std::array<Vec3d, 96> batch_;
+  std::array<std::uint32_t, 96> hashes_;
+  std::size_t batched_ = 0;
   Mesh mesh_;
 };
 

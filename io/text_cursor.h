@@ -20,7 +20,7 @@ class TextCursor {
 
   void skipBlanks() {
     for (;;) {
-      if (at_ != end_ && (*at_ == ' ' || *at_ == '\t' || *at_ == '\v' || *at_ == '\f')) {
+      if (at_ != end_ && isBlank(*at_)) {
         ++at_;
       } else if (continuesLine(at_)) {
         ++at_;
@@ -38,14 +38,14 @@ class TextCursor {
 
   /// To the start of the next line; backslashes do not continue this one.
   void skipLine() {
-    while (!atLineEnd()) ++at_;
+    line();
     skipLineEnd();
   }
 
   /// The rest of the line.
   std::string_view line() {
     const char* begin = at_;
-    while (!atLineEnd()) ++at_;
+    while (at_ != end_ && (isPlain(*at_) || !endsLine(at_))) ++at_;
     return {begin, at_};
   }
 
@@ -53,7 +53,7 @@ class TextCursor {
   std::string_view word() {
     skipBlanks();
     const char* begin = at_;
-    while (!endsWord(at_)) ++at_;
+    while (at_ != end_ && (isPlain(*at_) || !endsWord(at_))) ++at_;
     return {begin, at_};
   }
 
@@ -79,9 +79,11 @@ class TextCursor {
     return at != end_ && *at == '\\' && at + 1 != end_ && endsLine(at + 1);
   }
   [[nodiscard]] bool endsWord(const char* at) const {
-    return endsLine(at) || *at == ' ' || *at == '\t' || *at == '\v' || *at == '\f' ||
-           continuesLine(at);
+    return endsLine(at) || isBlank(*at) || continuesLine(at);
   }
+  static bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
+  /// Most characters are told to be part of a word, and of a line, by one comparison.
+  static bool isPlain(char c) { return static_cast<signed char>(c) > ' ' && c != '\\'; }
   void skipLineEnd() {
     if (at_ != end_ && *at_ == '\r') {
       ++at_;

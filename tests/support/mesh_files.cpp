@@ -52,7 +52,7 @@ std::string asciiStl(const Mesh& mesh, std::string_view newline) {
   std::string text("solid part");
   text += end;
   for (const Mesh::Triangle& triangle : mesh.triangles) {
-    text += "  facet normal 0 0 0" + end + "    outer loop" + end;
+    text += "  facet normal 0.000000e+00 0.000000e+00 0.000000e+00" + end + "    outer loop" + end;
     for (const std::uint32_t vertex : triangle) {
       text += "      vertex " + words(mesh.vertices[vertex]) + end;
     }
