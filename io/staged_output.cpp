@@ -46,7 +46,7 @@ void StagedOutput::check(const fs::path& given, Kind kind, bool overwrite) {
   const std::string name = "'" + given.string() + "'";
   if (target.empty() || target.filename() == "." || target.filename() == ".." ||
       !target.has_filename()) {
-    throw UsageError("cannot write to " + name + "; give the output a name of its own");
+    throw UsageError("cannot write to " + name + ": give a folder or file a name of its own");
   }
   std::error_code ignored;
   const fs::file_status status = fs::status(target, ignored);

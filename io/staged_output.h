@@ -7,9 +7,8 @@
 namespace vdbdither {
 
 /// A file or folder that exists under its name only once it is complete. It is written as the
-/// hidden sibling
-/// `.NAME.partial-PID` and renamed at the end; a run that fails removes it, and what a killed run
-/// left behind is removed by the next one that writes the same name.
+/// hidden sibling `.NAME.partial-PID` and renamed at the end; a run that fails removes it, and what
+/// a killed run left behind is removed by the next one that writes the same name.
 class StagedOutput {
  public:
   enum class Kind { file, folder };

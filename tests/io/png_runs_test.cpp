@@ -8,69 +8,18 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <png.h>
 #include <spng.h>
 
+#include "tests/support/png_reader.h"
 #include "tests/support/run_images.h"
 #include "vdbdither/errors.h"
 
 namespace vdbdither {
 namespace {
 
+using test::PngImage;
+using test::readPng;
 using test::runImage;
-
-struct Decoded {
-  std::uint32_t width = 0;
-  std::uint32_t height = 0;
-  int bit_depth = 0;
-  int colour_type = 0;
-  std::uint32_t dots_per_metre_x = 0;
-  std::uint32_t dots_per_metre_y = 0;
-  std::vector<std::uint8_t> rows;  ///< as stored: packed bits for one bit a pixel
-};
-
-/// libpng, with every error and warning a failure.
-Decoded decodeByLibpng(const std::vector<std::uint8_t>& bytes) {
-  Decoded result;
-  const auto complain = [](png_structp png, png_const_charp text) {
-    *static_cast<std::string*>(png_get_error_ptr(png)) = text;
-    png_longjmp(png, 1);
-  };
-  std::string error;
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &error, complain, complain);
-  png_infop info = png_create_info_struct(png);
-  std::pair<const std::uint8_t*, std::size_t> left{bytes.data(), bytes.size()};
-  std::vector<png_bytep> row_pointers;
-  if (setjmp(png_jmpbuf(png)) == 0) {
-    png_set_read_fn(png, &left, [](png_structp reader, png_bytep to, std::size_t size) {
-      auto& [from, rest] =
-          *static_cast<std::pair<const std::uint8_t*, std::size_t>*>(png_get_io_ptr(reader));
-      if (size > rest) png_error(reader, "truncated");
-      std::copy_n(from, size, to);
-      from += size;
-      rest -= size;
-    });
-    png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
-    png_set_user_limits(png, 1 << 25, 1 << 25);
-    png_read_info(png, info);
-    result.width = png_get_image_width(png, info);
-    result.height = png_get_image_height(png, info);
-    result.bit_depth = png_get_bit_depth(png, info);
-    result.colour_type = png_get_color_type(png, info);
-    int unit = 0;
-    png_get_pHYs(png, info, &result.dots_per_metre_x, &result.dots_per_metre_y, &unit);
-    const std::size_t stride = png_get_rowbytes(png, info);
-    result.rows.resize(stride * result.height);
-    for (std::size_t y = 0; y < result.height; ++y)
-      row_pointers.push_back(result.rows.data() + stride * y);
-    png_read_image(png, row_pointers.data());
-    png_read_end(png, nullptr);
-  }
-  png_destroy_read_struct(&png, &info, nullptr);
-  EXPECT_EQ(error, "");
-  EXPECT_EQ(left.second, 0U) << "bytes after the image";
-  return result;
-}
 
 std::vector<std::uint8_t> decodeBySpng(const std::vector<std::uint8_t>& bytes) {
   spng_ctx* context = spng_ctx_new(0);
@@ -113,12 +62,11 @@ std::vector<std::uint8_t> pixelBytes(const RunImage& image, const PngFormat& for
 void expectDecodes(const RunImage& image, const PngFormat& format) {
   const std::vector<std::uint8_t> bytes = encodePng(image, format);
   const std::vector<std::uint8_t> expected = pixelBytes(image, format);
-  const Decoded decoded = decodeByLibpng(bytes);
+  const PngImage decoded = readPng(bytes);
   EXPECT_EQ(decoded.width, image.width);
   EXPECT_EQ(decoded.height, image.height);
   EXPECT_EQ(decoded.bit_depth, format.pixels == PngPixels::grey1 ? 1 : 8);
-  EXPECT_EQ(decoded.colour_type,
-            format.pixels == PngPixels::rgba8 ? PNG_COLOR_TYPE_RGBA : PNG_COLOR_TYPE_GRAY);
+  EXPECT_EQ(decoded.colour_type, format.pixels == PngPixels::rgba8 ? 6 : 0);
   EXPECT_TRUE(decoded.rows == expected) << "by libpng, " << image.width << " x " << image.height;
   EXPECT_TRUE(decodeBySpng(bytes) == expected)
       << "by spng, " << image.width << " x " << image.height;
@@ -220,8 +168,8 @@ TEST(PngRuns, NeighbouringRunsOfOneColourAreOne) {
 
 TEST(PngRuns, PixelSizeIsDotsPerMetre) {
   const RunImage image = runImage(3, 2, [](int, int) { return 0U; });
-  const Decoded decoded =
-      decodeByLibpng(encodePng(image, {PngPixels::grey8, {}, 25.4 / 600, 25.4 / 300}));
+  const PngImage decoded =
+      readPng(encodePng(image, {PngPixels::grey8, {}, 25.4 / 600, 25.4 / 300}));
   EXPECT_EQ(decoded.dots_per_metre_x, 23622U);
   EXPECT_EQ(decoded.dots_per_metre_y, 11811U);
 }

@@ -1,0 +1,111 @@
+// Colours of the usual inks: the palette of the GrabCAD Voxel Print user guide.
+
+#include "io/material_table.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+
+#include <nlohmann/json.hpp>
+
+#include "vdbdither/errors.h"
+
+namespace vdbdither {
+
+using nlohmann::ordered_json;
+
+namespace {
+
+const std::vector<Material>& usualInks() {
+  static const std::vector<Material> inks = {
+      {"white", {240, 240, 240, 255}}, {"VeroPureWht", {240, 240, 240, 255}},
+      {"black", {26, 26, 29, 255}},    {"VeroBlack", {26, 26, 29, 255}},
+      {"clear", {227, 233, 253, 255}}, {"VeroClear", {227, 233, 253, 255}},
+      {"cyan", {0, 90, 158, 255}},     {"VeroCyan", {0, 90, 158, 255}},
+      {"magenta", {166, 33, 98, 255}}, {"VeroMgnt", {166, 33, 98, 255}},
+      {"yellow", {200, 189, 3, 255}},  {"VeroYellow", {200, 189, 3, 255}}};
+  return inks;
+}
+
+bool sameName(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
+    return std::tolower(x) == std::tolower(y);
+  });
+}
+
+}  // namespace
+
+std::array<std::uint8_t, 4> parseColour(std::string_view text) {
+  const UsageError error("'" + std::string(text) +
+                         "' is no colour; give #rrggbb or r,g,b of 0 to 255");
+  std::array<std::uint8_t, 4> rgba = {0, 0, 0, 255};
+  const bool hexadecimal = text.starts_with('#');
+  if (hexadecimal) text.remove_prefix(1);
+  std::size_t channels = 0;
+  while (channels < 4) {
+    const std::string_view part = text.substr(0, hexadecimal ? 2 : text.find(','));
+    const char* end = part.data() + part.size();
+    const auto [stop, failed] =
+        std::from_chars(part.data(), end, rgba[channels], hexadecimal ? 16 : 10);
+    if (failed != std::errc() || stop != end || (hexadecimal && part.size() != 2)) throw error;
+    ++channels;
+    text.remove_prefix(part.size());
+    if (text.empty()) break;
+    if (!hexadecimal) text.remove_prefix(1);
+  }
+  if (!text.empty() || channels < 3) throw error;
+  return rgba;
+}
+
+std::string toJson(const MaterialTable& table) {
+  ordered_json json = ordered_json::array();
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    json.push_back({{"index", i + 1}, {"name", table[i].name}, {"rgba", table[i].rgba}});
+  }
+  return json.dump();
+}
+
+MaterialTable materialTableFromJson(const std::string& text) {
+  try {
+    MaterialTable table;
+    for (const ordered_json& entry : ordered_json::parse(text)) {
+      if (entry.at("index") != table.size() + 1) throw DataError("indices must be 1, 2, 3, …");
+      table.push_back({entry.at("name"), entry.at("rgba")});
+    }
+    return table;
+  } catch (const std::exception& error) {
+    throw DataError("metadata " + std::string(materials_key) +
+                    " is not a table of materials: " + error.what());
+  }
+}
+
+Material parseMaterial(std::string_view text, const std::vector<Material>& known) {
+  Material material;
+  const std::size_t equals = text.find('=');
+  material.name = text.substr(0, equals);
+  const bool clean = std::all_of(material.name.begin(), material.name.end(), [](unsigned char c) {
+    return std::isalnum(c) || c == '-' || c == '_' || c == '.';
+  });
+  if (material.name.empty() || !clean || material.name.starts_with('.')) {
+    throw UsageError("'" + std::string(text) +
+                     "' has no proper material name; use letters, digits, '-', '_' and '.'");
+  }
+  if (equals != std::string_view::npos) {
+    material.rgba = parseColour(text.substr(equals + 1));
+    return material;
+  }
+  std::vector<std::string> names;
+  for (const std::vector<Material>* list : {&known, &usualInks()}) {
+    for (const Material& candidate : *list) {
+      if (sameName(candidate.name, material.name)) return candidate;
+      if (std::find(names.begin(), names.end(), candidate.name) == names.end())
+        names.push_back(candidate.name);
+    }
+  }
+  std::string message = "no material '" + material.name + "'; there are";
+  for (const std::string& name : names) message += " " + name;
+  throw UsageError(message + ", and any other with its colour, as in " + material.name +
+                   "=#rrggbb");
+}
+
+}  // namespace vdbdither

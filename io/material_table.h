@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "vdbdither/printer.h"
+
+namespace vdbdither {
+
+/// The materials of a job: material index i is entry i − 1, as index 0 is empty space.
+using MaterialTable = std::vector<Material>;
+
+/// The metadata key under which the table travels.
+inline constexpr std::string_view materials_key = "vdbdither:materials";
+
+/// The table as one line of JSON: index, name and display colour of each; and back. Throws
+/// DataError.
+std::string toJson(const MaterialTable& table);
+MaterialTable materialTableFromJson(const std::string& text);
+
+/// Reads `#rrggbb`, `#rrggbbaa`, `r,g,b` or `r,g,b,a`; alpha is 255 unless given. Throws
+/// UsageError.
+std::array<std::uint8_t, 4> parseColour(std::string_view text);
+
+/// Reads `name`, `name=#rrggbb`, `name=#rrggbbaa`, `name=r,g,b` or `name=r,g,b,a`; names may serve
+/// as file names. A bare name is looked up in `known`, then among the usual inks (white, black,
+/// clear, cyan, magenta, yellow and their Vero names), case aside. Throws UsageError with what
+/// would have been accepted.
+Material parseMaterial(std::string_view text, const std::vector<Material>& known);
+
+}  // namespace vdbdither

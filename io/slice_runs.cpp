@@ -1,0 +1,210 @@
+#include "io/slice_runs.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::Coord;
+
+/// Eight rows of eight layers, the unit in which a tree is walked: row 8·y + z, as a leaf orders
+/// its voxels.
+constexpr int strip_rows = leaf_layers * leaf_layers;
+
+/// The runs of a strip, row after row.
+struct StripRuns {
+  std::array<std::uint32_t, strip_rows + 1> begin{};
+  std::vector<Run> runs;
+};
+
+using LeafValues = std::array<std::int32_t, leaf_layers * strip_rows>;
+
+/// What a voxel of a tile counts as, and those of a leaf: eight planes of equal x, each in the
+/// order of a strip.
+std::uint32_t countsAs(std::int32_t value, bool) { return static_cast<std::uint32_t>(value); }
+std::uint32_t countsAs(bool value, bool active) { return value && active ? 1 : 0; }
+
+const std::int32_t* planes(const openvdb::Int32Tree::LeafNodeType& leaf, LeafValues&) {
+  return leaf.buffer().data();
+}
+const std::int32_t* planes(const openvdb::BoolTree::LeafNodeType& leaf, LeafValues& scratch) {
+  for (int x = 0; x < leaf_layers; ++x) {
+    const std::uint64_t bits =
+        leaf.getValueMask().getWord<openvdb::Index64>(x) & leaf.buffer().data()[x];
+    for (int row = 0; row < strip_rows; ++row)
+      scratch[x * strip_rows + row] = static_cast<std::int32_t>(bits >> row & 1);
+  }
+  return scratch.data();
+}
+
+/// Collects the runs of a strip from left to right.
+class StripBuilder {
+ public:
+  void clear() {
+    for (auto& row : rows_) row.clear();
+    values_.fill(0);
+    uniform_ = true;
+  }
+
+  /// From `column` on every row holds `value`.
+  void fill(std::uint32_t column, std::uint32_t value) {
+    const auto wanted = static_cast<std::int32_t>(value);
+    if (uniform_ && values_[0] == wanted) return;
+    for (int row = 0; row < strip_rows; ++row) change(row, column, wanted);
+    uniform_ = true;
+  }
+
+  /// From `column` on each row holds its own value.
+  void plane(std::uint32_t column, const std::int32_t* values) {
+    for (int group = 0; group < strip_rows; group += leaf_layers) {
+      std::int32_t difference = 0;
+      for (int row = group; row < group + leaf_layers; ++row)
+        difference |= values[row] ^ values_[row];
+      if (!difference) continue;
+      uniform_ = false;
+      for (int row = group; row < group + leaf_layers; ++row) change(row, column, values[row]);
+    }
+  }
+
+  [[nodiscard]] StripRuns finish(std::uint32_t width) {
+    StripRuns strip;
+    std::size_t count = strip_rows;
+    for (const auto& row : rows_) count += row.size();
+    strip.runs.reserve(count);
+    for (int row = 0; row < strip_rows; ++row) {
+      strip.runs.insert(strip.runs.end(), rows_[row].begin(), rows_[row].end());
+      strip.runs.push_back({width, static_cast<std::uint32_t>(values_[row])});
+      strip.begin[row + 1] = static_cast<std::uint32_t>(strip.runs.size());
+    }
+    return strip;
+  }
+
+ private:
+  void change(int row, std::uint32_t column, std::int32_t value) {
+    if (values_[row] == value) return;
+    if (column > 0) rows_[row].push_back({column, static_cast<std::uint32_t>(values_[row])});
+    values_[row] = value;
+  }
+
+  std::array<std::vector<Run>, strip_rows> rows_;
+  std::array<std::int32_t, strip_rows> values_{};
+  bool uniform_ = true;
+};
+
+template <typename Grid>
+StripRuns walkStrip(const Grid& grid, const SliceFrame& frame, int y, int z,
+                    StripBuilder& builder) {
+  using Tree = typename Grid::TreeType;
+  using Branch = typename Tree::RootNodeType::ChildNodeType::ChildNodeType;
+  const int x_begin = frame.box.min().x();
+  const int x_end = frame.box.max().x() + 1;
+  const auto column = [&](int x) {
+    return static_cast<std::uint32_t>(std::max(x, x_begin) - x_begin + frame.padding);
+  };
+  const auto accessor = grid.getConstAccessor();
+  LeafValues scratch;
+  builder.clear();
+  for (int x = x_begin & ~(leaf_layers - 1); x < x_end;) {
+    const Coord origin(x, y, z);
+    const int branch_end = (x | (Branch::DIM - 1)) + 1;
+    const Branch* branch = accessor.template probeConstNode<Branch>(origin);
+    if (!branch) {
+      typename Grid::ValueType value;
+      const bool active = accessor.probeValue(origin, value);
+      builder.fill(column(x), countsAs(value, active));
+      x = branch_end;
+      continue;
+    }
+    for (const int end = std::min(branch_end, x_end); x < end; x += leaf_layers) {
+      const Coord at(x, y, z);
+      if (const auto* leaf = accessor.probeConstLeaf(at)) {
+        const std::int32_t* values = planes(*leaf, scratch);
+        for (int i = std::max(0, x_begin - x); i < std::min(leaf_layers, x_end - x); ++i) {
+          builder.plane(column(x + i), values + i * strip_rows);
+        }
+      } else {
+        builder.fill(column(x), countsAs(branch->getValue(at), branch->isValueOn(at)));
+      }
+    }
+  }
+  if (frame.padding) builder.fill(frame.width() - frame.padding, 0);
+  return builder.finish(frame.width());
+}
+
+void mirror(std::span<Run> runs) {
+  std::reverse(runs.begin(), runs.end());
+  const std::uint32_t width = runs.front().end;
+  for (std::size_t i = 0; i + 1 < runs.size(); ++i) runs[i].end = width - runs[i + 1].end;
+  runs.back().end = width;
+}
+
+template <typename Grid>
+std::vector<RunImage> slice(const Grid& grid, const SliceFrame& frame, ZRange layers) {
+  std::vector<RunImage> images(std::max(0, layers.size()));
+  const ZRange aligned = alignedToLeaves(layers);
+  const int y_begin = frame.box.min().y() & ~(leaf_layers - 1);
+  const int strip_count = (frame.box.max().y() - y_begin) / leaf_layers + 1;
+  std::vector<StripRuns> strips(strip_count);
+  for (int z = aligned.begin; z < aligned.end; z += leaf_layers) {
+    tbb::parallel_for(
+        tbb::blocked_range<int>(0, strip_count, 4), [&](const tbb::blocked_range<int>& range) {
+          StripBuilder builder;
+          for (int strip = range.begin(); strip < range.end(); ++strip) {
+            strips[strip] = walkStrip(grid, frame, y_begin + strip * leaf_layers, z, builder);
+          }
+        });
+    const ZRange here = intersection({z, z + leaf_layers}, layers);
+    tbb::parallel_for(here.begin, here.end, [&](int layer) {
+      RunImage& image = images[layer - layers.begin];
+      image.width = frame.width();
+      image.height = frame.height();
+      image.row_begin.reserve(image.height + 1);
+      image.row_begin.push_back(0);
+      std::size_t size = 2 * static_cast<std::size_t>(frame.padding);
+      for (const StripRuns& strip : strips) {
+        for (int row = layer - z; row < strip_rows; row += leaf_layers)
+          size += strip.begin[row + 1] - strip.begin[row];
+      }
+      image.runs.reserve(size);
+      const auto addBlankRows = [&] {
+        for (int i = 0; i < frame.padding; ++i) {
+          image.runs.push_back({image.width, 0});
+          image.row_begin.push_back(image.runs.size());
+        }
+      };
+      addBlankRows();
+      const int rows = frame.box.dim().y();
+      for (int i = 0; i < rows; ++i) {
+        const int y = frame.flip_y ? frame.box.min().y() + i : frame.box.max().y() - i;
+        const StripRuns& strip = strips[(y - y_begin) / leaf_layers];
+        const int row = (y - y_begin) % leaf_layers * leaf_layers + (layer - z);
+        image.runs.insert(image.runs.end(), strip.runs.begin() + strip.begin[row],
+                          strip.runs.begin() + strip.begin[row + 1]);
+        if (frame.flip_x) mirror(std::span(image.runs).subspan(image.row_begin.back()));
+        image.row_begin.push_back(image.runs.size());
+      }
+      addBlankRows();
+    });
+  }
+  return images;
+}
+
+}  // namespace
+
+std::vector<RunImage> sliceRuns(const openvdb::Int32Grid& grid, const SliceFrame& frame,
+                                ZRange layers) {
+  return slice(grid, frame, layers);
+}
+
+std::vector<RunImage> sliceRuns(const openvdb::BoolGrid& grid, const SliceFrame& frame,
+                                ZRange layers) {
+  return slice(grid, frame, layers);
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <vector>
+
+#include "io/run_image.h"
+#include "vdbdither/lattice.h"
+#include "vdbdither/openvdb.h"
+
+namespace vdbdither {
+
+/// Which voxels of a layer a picture shows, and which way round: seen from above, x to the right
+/// and y upwards, so that the first row holds the greatest y.
+struct SliceFrame {
+  openvdb::CoordBBox box;  ///< columns and rows come from its x and y, inclusive
+  int padding = 0;         ///< empty voxels added on each side
+  bool flip_x = false;
+  bool flip_y = false;
+
+  [[nodiscard]] std::uint32_t width() const { return box.dim().x() + 2 * padding; }
+  [[nodiscard]] std::uint32_t height() const { return box.dim().y() + 2 * padding; }
+};
+
+/// The layers of `grid` as runs of its values, one picture per layer of `layers`. The tree is
+/// walked once for eight layers together, in parallel; empty space and tiles cost next to nothing.
+std::vector<RunImage> sliceRuns(const openvdb::Int32Grid& grid, const SliceFrame& frame,
+                                ZRange layers);
+
+/// The same for a set of voxels: 1 where active and true, else 0.
+std::vector<RunImage> sliceRuns(const openvdb::BoolGrid& grid, const SliceFrame& frame,
+                                ZRange layers);
+
+}  // namespace vdbdither

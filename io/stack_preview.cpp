@@ -1,0 +1,255 @@
+#include "io/stack_preview.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+#include "io/png_runs.h"
+
+namespace vdbdither {
+
+namespace {
+
+constexpr int largest_width = 1200;
+constexpr int largest_height = 1000;
+constexpr int margin = 20;
+constexpr int fineness = 2;  ///< rays per pixel along each side
+constexpr std::array<float, 3> background = {112, 120, 132};
+
+int pixels(double length_mm, double pixel_mm) {
+  return std::max(1, static_cast<int>(std::lround(length_mm / pixel_mm)));
+}
+
+}  // namespace
+
+StackPreview::StackPreview(const openvdb::Vec3d& pitch_mm, std::uint32_t width,
+                           std::uint32_t height, ZRange layers, std::vector<std::uint32_t> palette)
+    : pitch_mm_(pitch_mm),
+      width_(width),
+      height_(height),
+      layers_(layers),
+      palette_(std::move(palette)) {
+  const double width_mm = width * pitch_mm.x();
+  const double front_mm = layers.size() * pitch_mm.z();
+  const double slice_mm = height * pitch_mm.y();
+  pixel_mm_ = std::max(2 * width_mm / (largest_width - 3 * margin - 2),
+                       std::max(front_mm, slice_mm) / (largest_height - 2 * margin - 1));
+  columns_ = pixels(width_mm, pixel_mm_);
+  front_rows_ = pixels(front_mm, pixel_mm_);
+  slice_rows_ = pixels(slice_mm, pixel_mm_);
+  const int rays = columns_ * fineness;
+  hits_.assign(static_cast<std::size_t>(rays) * front_rows_ * fineness, Hit{0, 0});
+  next_ray_.resize(rays + 1);
+  first_ray_.resize(width + 1);
+  int ray = 0;
+  for (std::uint32_t x = 0; x <= width; ++x) {
+    while (ray < rays && (ray + 0.5) / rays * width < x) ++ray;
+    first_ray_[x] = ray;
+  }
+}
+
+void StackPreview::add(int z, RunImage&& slice, std::uint64_t filled) {
+  if (filled == 0) return;
+  const int rows = front_rows_ * fineness;
+  const int rays = columns_ * fineness;
+  const double rows_per_layer = static_cast<double>(rows) / layers_.size();
+  const int from = static_cast<int>(std::ceil((z - layers_.begin) * rows_per_layer - 0.5));
+  const int to = static_cast<int>(std::ceil((z + 1 - layers_.begin) * rows_per_layer - 0.5));
+  for (int row = std::max(0, from); row < std::min(rows, to); ++row) {
+    Hit* hits = hits_.data() + static_cast<std::size_t>(rows - 1 - row) * rays;
+    if (row == std::max(0, from)) {
+      look(slice, hits);
+    } else {
+      std::copy_n(hits + rays, rays, hits);
+    }
+  }
+  if (filled > fullest_count_) {
+    fullest_count_ = filled;
+    fullest_ = std::move(slice);
+  }
+}
+
+void StackPreview::look(const RunImage& slice, Hit* hits) {
+  std::iota(next_ray_.begin(), next_ray_.end(), 0U);
+  const auto nextRay = [&](std::uint32_t ray) {
+    while (next_ray_[ray] != ray) ray = next_ray_[ray] = next_ray_[next_ray_[ray]];
+    return ray;
+  };
+  for (std::uint32_t y = slice.height; y-- > 0;) {
+    std::uint32_t begin = 0;
+    for (const Run& run : slice.row(y)) {
+      if (run.value) {
+        const std::uint32_t end = first_ray_[run.end];
+        for (std::uint32_t ray = nextRay(first_ray_[begin]); ray < end; ray = nextRay(ray)) {
+          hits[ray] = {static_cast<float>((slice.height - 1 - y) * pitch_mm_.y()), run.value};
+          next_ray_[ray] = ray + 1;
+        }
+      }
+      begin = run.end;
+    }
+  }
+}
+
+std::vector<StackPreview::Pixel> StackPreview::front() const {
+  const int rays = columns_ * fineness;
+  struct Surface {
+    float depth_mm = 0;
+    float cover = 0;
+    Pixel colour{0, 0, 0};
+  };
+  std::vector<Surface> surface(static_cast<std::size_t>(columns_) * front_rows_);
+  for (int row = 0; row < front_rows_; ++row) {
+    for (int column = 0; column < columns_; ++column) {
+      Surface& pixel = surface[static_cast<std::size_t>(row) * columns_ + column];
+      for (int i = 0; i < fineness * fineness; ++i) {
+        const Hit& hit = hits_[static_cast<std::size_t>(row * fineness + i / fineness) * rays +
+                               column * fineness + i % fineness];
+        if (!hit.value) continue;
+        const std::uint32_t colour = palette_[hit.value];
+        pixel.depth_mm += hit.depth_mm;
+        pixel.colour.red += static_cast<float>(colour & 255);
+        pixel.colour.green += static_cast<float>(colour >> 8 & 255);
+        pixel.colour.blue += static_cast<float>(colour >> 16 & 255);
+        pixel.cover += 1;
+      }
+      if (pixel.cover > 0) {
+        pixel.depth_mm /= pixel.cover;
+        for (float* channel : {&pixel.colour.red, &pixel.colour.green, &pixel.colour.blue})
+          *channel /= pixel.cover;
+      }
+      pixel.cover /= fineness * fineness;
+    }
+  }
+
+  // The surface is a staircase of voxels: its slope is that of a plane fitted to the pixels around
+  // that belong to it.
+  const double step_mm = std::max({pitch_mm_.x(), pitch_mm_.y(), pitch_mm_.z(), pixel_mm_});
+  const int radius = std::clamp(static_cast<int>(std::ceil(2 * step_mm / pixel_mm_)), 2, 12);
+  std::vector<Pixel> result(surface.size());
+  tbb::parallel_for(0, front_rows_, [&](int row) {
+    for (int column = 0; column < columns_; ++column) {
+      const Surface& here = surface[static_cast<std::size_t>(row) * columns_ + column];
+      Pixel& out = result[static_cast<std::size_t>(row) * columns_ + column];
+      out = {background[0], background[1], background[2]};
+      if (here.cover <= 0) continue;
+      double n = 0, x = 0, z = 0, d = 0, xx = 0, xz = 0, zz = 0, xd = 0, zd = 0;
+      for (int v = std::max(-radius, -row); v <= std::min(radius, front_rows_ - 1 - row); ++v) {
+        for (int u = std::max(-radius, -column); u <= std::min(radius, columns_ - 1 - column);
+             ++u) {
+          const Surface& near = surface[static_cast<std::size_t>(row + v) * columns_ + column + u];
+          const double depth = near.depth_mm - here.depth_mm;
+          const double distance = std::hypot(u, v);
+          if (near.cover <= 0 || distance > radius ||
+              std::abs(depth) > 4 * pixel_mm_ * distance + 2 * step_mm)
+            continue;
+          const double weight = near.cover * (radius + 1 - distance);
+          n += weight, x += weight * u, z -= weight * v, d += weight * depth;
+          xx += weight * u * u, xz -= weight * u * v, zz += weight * v * v;
+          xd += weight * u * depth, zd -= weight * v * depth;
+        }
+      }
+      xx -= x * x / n, xz -= x * z / n, zz -= z * z / n, xd -= x * d / n, zd -= z * d / n;
+      const double determinant = xx * zz - xz * xz;
+      double slope_x = 0;
+      double slope_z = 0;
+      if (determinant > 1e-6 * n * n) {
+        slope_x = (xd * zz - zd * xz) / determinant / pixel_mm_;
+        slope_z = (zd * xx - xd * xz) / determinant / pixel_mm_;
+      }
+      // Outward normal (slope_x, -1, slope_z); a key light from the upper left in front, a fill
+      // from the right.
+      const double length = std::sqrt(slope_x * slope_x + 1 + slope_z * slope_z);
+      const double key = std::max(0.0, (-0.5 * slope_x + 0.62 + 0.605 * slope_z) / length);
+      const double fill = std::max(0.0, (0.8 * slope_x + 0.6) / length);
+      const auto light = static_cast<float>(std::min(1.0, 0.14 + 0.8 * key + 0.14 * fill));
+      const auto blend = [&](float colour, float behind) {
+        return behind + here.cover * ((8 + colour * 0.97F) * light - behind);
+      };
+      out = {blend(here.colour.red, background[0]), blend(here.colour.green, background[1]),
+             blend(here.colour.blue, background[2])};
+    }
+  });
+  return result;
+}
+
+std::vector<StackPreview::Pixel> StackPreview::slice() const {
+  std::vector<Pixel> result(static_cast<std::size_t>(columns_) * slice_rows_, Pixel{0, 0, 0});
+  std::vector<Pixel> line(columns_);
+  // Every pixel is the mean of what it covers: `spread` gives each pixel between two positions its
+  // share.
+  const auto spread = [](double begin, double end, int count, const auto& give) {
+    for (int i = static_cast<int>(begin); i < count && i < end; ++i) {
+      give(i, static_cast<float>(std::min(end, i + 1.0) - std::max<double>(begin, i)));
+    }
+  };
+  const double columns_per_voxel = static_cast<double>(columns_) / width_;
+  const double rows_per_voxel = static_cast<double>(slice_rows_) / height_;
+  for (std::uint32_t y = 0; y < height_; ++y) {
+    std::fill(line.begin(), line.end(), Pixel{0, 0, 0});
+    std::uint32_t begin = 0;
+    const std::array<Run, 1> blank = {Run{width_, 0}};
+    for (const Run& run : fullest_.runs.empty() ? std::span<const Run>(blank) : fullest_.row(y)) {
+      const std::uint32_t colour = palette_[run.value];
+      const Pixel pixel =
+          run.value ? Pixel{static_cast<float>(colour & 255), static_cast<float>(colour >> 8 & 255),
+                            static_cast<float>(colour >> 16 & 255)}
+                    : Pixel{background[0], background[1], background[2]};
+      spread(begin * columns_per_voxel, run.end * columns_per_voxel, columns_,
+             [&](int column, float share) {
+               line[column].red += share * pixel.red;
+               line[column].green += share * pixel.green;
+               line[column].blue += share * pixel.blue;
+             });
+      begin = run.end;
+    }
+    spread(y * rows_per_voxel, (y + 1) * rows_per_voxel, slice_rows_, [&](int row, float share) {
+      Pixel* to = result.data() + static_cast<std::size_t>(row) * columns_;
+      for (int column = 0; column < columns_; ++column) {
+        to[column].red += share * line[column].red;
+        to[column].green += share * line[column].green;
+        to[column].blue += share * line[column].blue;
+      }
+    });
+  }
+  return result;
+}
+
+RunImage StackPreview::picture() const {
+  const std::array<std::pair<std::vector<Pixel>, int>, 2> panels = {
+      std::pair{front(), front_rows_}, std::pair{slice(), slice_rows_}};
+  RunImage image;
+  image.width = static_cast<std::uint32_t>(2 * columns_ + 3 * margin);
+  image.height = static_cast<std::uint32_t>(std::max(front_rows_, slice_rows_) + 2 * margin);
+  image.row_begin.push_back(0);
+  const auto byte = [](float value) {
+    return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 255.0F) + 0.5F);
+  };
+  for (std::uint32_t y = 0; y < image.height; ++y) {
+    std::uint32_t x = 0;
+    const auto put = [&](const Pixel& pixel) {
+      image.runs.push_back({++x, rgba(byte(pixel.red), byte(pixel.green), byte(pixel.blue))});
+    };
+    const Pixel behind{background[0], background[1], background[2]};
+    const auto putMargin = [&] {
+      for (int i = 0; i < margin; ++i) put(behind);
+    };
+    putMargin();
+    for (const auto& [panel, rows] : panels) {
+      // Both stand on the bottom margin.
+      const int row = static_cast<int>(y) - (static_cast<int>(image.height) - margin - rows);
+      for (int column = 0; column < columns_; ++column) {
+        put(row < 0 || row >= rows ? behind
+                                   : panel[static_cast<std::size_t>(row) * columns_ + column]);
+      }
+      putMargin();
+    }
+    image.row_begin.push_back(image.runs.size());
+  }
+  return image;
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <openvdb/math/Vec3.h>
+
+#include "io/run_image.h"
+#include "vdbdither/lattice.h"
+
+namespace vdbdither {
+
+/// A picture of a stack for people: on the left the part from the front (orthographic, shaded, in
+/// the colours of its materials), on the right its fullest slice, both on one scale in mm, so that
+/// voxels have their true shape. The front is the bottom edge of the slices. Gathered layer by
+/// layer; memory is a few pictures and one slice.
+class StackPreview {
+ public:
+  /// `pitch_mm` of the voxels, `width` and `height` of every slice in voxels, the `layers` to come,
+  /// and the colour of each value of the slices (0 is empty).
+  StackPreview(const openvdb::Vec3d& pitch_mm, std::uint32_t width, std::uint32_t height,
+               ZRange layers, std::vector<std::uint32_t> palette);
+
+  /// Adds layer `z`, of which `filled` voxels are not empty. Layers come in rising order; missing
+  /// ones are empty.
+  void add(int z, RunImage&& slice, std::uint64_t filled);
+
+  /// The picture as colours, at most 1200 x 1000 pixels.
+  [[nodiscard]] RunImage picture() const;
+
+ private:
+  /// What a ray from the front meets first.
+  struct Hit {
+    float depth_mm;
+    std::uint32_t value;  ///< 0: nothing
+  };
+  struct Pixel {
+    float red, green, blue;
+  };
+
+  void look(const RunImage& slice, Hit* hits);
+  [[nodiscard]] std::vector<Pixel> front() const;
+  [[nodiscard]] std::vector<Pixel> slice() const;
+
+  openvdb::Vec3d pitch_mm_;
+  std::uint32_t width_, height_;
+  ZRange layers_;
+  std::vector<std::uint32_t> palette_;
+  double pixel_mm_ = 1;
+  int columns_ = 1, front_rows_ = 1, slice_rows_ = 1;
+  std::vector<Hit>
+      hits_;  ///< samples of the front view, twice as fine as its pixels, top row first
+  std::vector<std::uint32_t> first_ray_;  ///< per column of a slice, the first ray at or after it
+  std::vector<std::uint32_t>
+      next_ray_;  ///< while a layer is looked at: the next ray that has met nothing
+  RunImage fullest_;
+  std::uint64_t fullest_count_ = 0;
+};
+
+}  // namespace vdbdither

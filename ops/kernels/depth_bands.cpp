@@ -1,0 +1,303 @@
+// A Euclidean distance transform by axes (T. Saito, J. Toriwaki, "New algorithms for Euclidean
+// distance transformation of an n-dimensional digitized picture", Pattern Recognition 27, 1994),
+// each pass cut at the greatest depth of interest and done only for leaf-sized blocks that hold
+// voxels: along z from the bits of the leaves, then y, then x.
+
+#include "ops/kernels/depth_bands.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::BoolTree;
+using openvdb::Coord;
+using Int32Leaf = openvdb::Int32Tree::LeafNodeType;
+
+constexpr int edge = leaf_layers;
+constexpr int plane = edge * edge;
+constexpr int volume = edge * edge * edge;
+constexpr float infinite = std::numeric_limits<float>::infinity();
+
+/// The solid voxels of a leaf, per x a word of 8·y + z.
+using LeafBits = std::array<std::uint64_t, edge>;
+
+bool none(const LeafBits& bits) {
+  return std::all_of(bits.begin(), bits.end(), [](std::uint64_t word) { return word == 0; });
+}
+bool all(const LeafBits& bits) {
+  return std::all_of(bits.begin(), bits.end(), [](std::uint64_t word) { return ~word == 0; });
+}
+
+/// Squared distances of a block's voxels, in the order of a leaf; stored only where they differ.
+struct Block {
+  enum class State { unknown, zero, beyond_reach, mixed };
+  State state = State::unknown;
+  std::array<float, volume> squares;
+};
+
+int leafOrigin(int index) { return index & ~(edge - 1); }
+
+/// Steps of `pitch_mm` within `depth_mm`, with a hair of tolerance: n steps hold n of them.
+int stepsWithin(double depth_mm, double pitch_mm) {
+  return static_cast<int>(depth_mm * (1 + 1e-6) / pitch_mm);
+}
+
+/// What comes back at one place.
+struct Output {
+  Coord origin;
+  std::unique_ptr<Int32Leaf> leaf;  ///< none: a tile
+  std::int32_t value = 0;
+};
+
+/// Transforms rows of blocks along x.
+class StripTransform {
+ public:
+  StripTransform(const openvdb::BoolGrid& solid, const openvdb::Vec3d& pitch_mm,
+                 const openvdb::CoordBBox& region, ZRange valid, std::span<const DepthBand> bands,
+                 std::int32_t beneath)
+      : accessor_(solid.getConstAccessor()),
+        valid_(valid),
+        bands_(bands),
+        beneath_(beneath),
+        x_begin_(leafOrigin(region.min().x())),
+        x_blocks_((region.max().x() - x_begin_) / edge + 1) {
+    const double depth_mm = bands.empty() ? 0 : bands.back().to_mm;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int i = 0; i <= stepsWithin(depth_mm, pitch_mm[axis]); ++i) {
+        const double distance_mm = i * pitch_mm[axis];
+        squares_[axis].push_back(static_cast<float>(distance_mm * distance_mm));
+      }
+    }
+    for (const DepthBand& band : bands) {
+      const double limit_mm = band.to_mm * (1 + 1e-6);
+      limits_.push_back(static_cast<float>(limit_mm * limit_mm));
+    }
+    blocks_.resize(x_blocks_ + 2 * static_cast<std::size_t>(blocksWithinReach(0)));
+    along_y_.resize(2 * static_cast<std::size_t>(blocksWithinReach(1)) + 1);
+  }
+
+  /// Adds the blocks at (·, y, z) that hold voxels to `out`.
+  void run(int y, int z, std::vector<Output>& out) {
+    using Branch = BoolTree::RootNodeType::ChildNodeType::ChildNodeType;
+    constexpr int branch_edge = static_cast<int>(Branch::DIM);
+    for (Block& block : blocks_) block.state = Block::State::unknown;
+    for (int index = 0; index < x_blocks_;) {
+      const Coord origin(x_begin_ + index * edge, y, z);
+      if (!accessor_.probeConstNode<Branch>(origin) && !accessor_.isValueOn(origin)) {
+        index += (branch_edge - (origin.x() & (branch_edge - 1))) / edge;
+        continue;
+      }
+      if (const LeafBits bits = bitsAt(origin); !none(bits)) {
+        out.push_back(makeOutput(index, origin, bits));
+      }
+      ++index;
+    }
+  }
+
+ private:
+  [[nodiscard]] int reach(int axis) const { return static_cast<int>(squares_[axis].size()) - 1; }
+  [[nodiscard]] int blocksWithinReach(int axis) const { return (reach(axis) + edge - 1) / edge; }
+
+  [[nodiscard]] LeafBits bitsAt(const Coord& origin) const {
+    LeafBits bits{};
+    const ZRange here = intersection({origin.z(), origin.z() + edge}, valid_);
+    if (here.empty()) return bits;
+    const std::uint64_t layers = (255U >> (edge - here.size())) << (here.begin - origin.z());
+    const std::uint64_t counting = layers * 0x0101010101010101U;
+    if (const auto* leaf = accessor_.probeConstLeaf(origin)) {
+      const std::uint64_t* values = leaf->buffer().data();
+      for (int x = 0; x < edge; ++x) {
+        bits[x] = leaf->getValueMask().getWord<openvdb::Index64>(x) & values[x] & counting;
+      }
+    } else if (bool value = false; accessor_.probeValue(origin, value) && value) {
+      bits.fill(counting);
+    }
+    return bits;
+  }
+
+  /// Solid voxels in a row above (or below) each column of the block, counted as far as the reach.
+  [[nodiscard]] std::array<int, plane> solidBeyond(const Coord& origin, bool above) const {
+    std::array<int, plane> count{};
+    std::array<bool, plane> open;
+    open.fill(true);
+    for (int depth = 0; depth < reach(2); depth += edge) {
+      const LeafBits bits = bitsAt(origin.offsetBy(0, 0, above ? edge + depth : -edge - depth));
+      bool any_open = false;
+      for (int column = 0; column < plane; ++column) {
+        if (!open[column]) continue;
+        const auto byte =
+            static_cast<std::uint8_t>(bits[column / edge] >> (edge * (column % edge)));
+        count[column] += above ? std::countr_one(byte) : std::countl_one(byte);
+        open[column] = byte == 255;
+        any_open = any_open || open[column];
+      }
+      if (!any_open) break;
+    }
+    return count;
+  }
+
+  /// Along z: to the nearest empty voxel of the column.
+  void passZ(const Coord& origin, Block& block) const {
+    const LeafBits bits = bitsAt(origin);
+    if (none(bits)) {
+      block.state = Block::State::zero;
+      return;
+    }
+    const std::array<int, plane> below = solidBeyond(origin, false);
+    const std::array<int, plane> above = solidBeyond(origin, true);
+    block.state = Block::State::beyond_reach;
+    for (int column = 0; column < plane; ++column) {
+      const std::uint64_t byte = bits[column / edge] >> (edge * (column % edge));
+      std::array<int, edge> steps;
+      int run = below[column];
+      for (int z = 0; z < edge; ++z) steps[z] = run = byte >> z & 1 ? run + 1 : 0;
+      run = above[column];
+      for (int z = edge - 1; z >= 0; --z) {
+        run = byte >> z & 1 ? run + 1 : 0;
+        steps[z] = std::min(steps[z], run);
+        const bool within = steps[z] <= reach(2);
+        block.squares[column * edge + z] = within ? squares_[2][steps[z]] : infinite;
+        if (within) block.state = Block::State::mixed;
+      }
+    }
+  }
+
+  /// to[i] = min(to[i], source[begin + i] + added) for i < count.
+  static void lower(float* to, const Block& source, int begin, int count, float added) {
+    if (source.state == Block::State::zero) {
+      for (int i = 0; i < count; ++i) to[i] = std::min(to[i], added);
+    } else if (source.state == Block::State::mixed) {
+      const float* from = source.squares.data() + begin;
+      for (int i = 0; i < count; ++i) to[i] = std::min(to[i], from[i] + added);
+    }
+  }
+
+  /// Along y, from the columns in front and behind. Made once per block.
+  const Block& passY(int index, const Coord& origin) {
+    Block& block = blocks_[index + blocksWithinReach(0)];
+    if (block.state != Block::State::unknown) return block;
+    const int margin = blocksWithinReach(1);
+    bool all_beyond = true;
+    for (int i = 0; i <= 2 * margin; ++i) {
+      passZ(origin.offsetBy(0, (i - margin) * edge, 0), along_y_[i]);
+      all_beyond = all_beyond && along_y_[i].state == Block::State::beyond_reach;
+    }
+    if (all_beyond || along_y_[margin].state == Block::State::zero) {
+      block.state = all_beyond ? Block::State::beyond_reach : Block::State::zero;
+      return block;
+    }
+    block.state = Block::State::mixed;
+    block.squares.fill(infinite);
+    for (int y = 0; y < edge; ++y) {
+      for (int step = -reach(1); step <= reach(1); ++step) {
+        const int from = y + step + margin * edge;
+        for (int x = 0; x < edge; ++x) {
+          lower(block.squares.data() + (x * edge + y) * edge, along_y_[from / edge],
+                (x * edge + from % edge) * edge, edge, squares_[1][std::abs(step)]);
+        }
+      }
+    }
+    return block;
+  }
+
+  /// Along x, and the bands.
+  Output makeOutput(int index, const Coord& origin, const LeafBits& bits) {
+    const int margin = blocksWithinReach(0);
+    bool all_beyond = true;
+    for (int i = -margin; i <= margin; ++i) {
+      const Block& block = passY(index + i, origin.offsetBy(i * edge, 0, 0));
+      all_beyond = all_beyond && block.state == Block::State::beyond_reach;
+    }
+    if (all_beyond && all(bits)) return {origin, nullptr, beneath_};
+    std::array<float, volume> squares;
+    squares.fill(infinite);
+    for (int x = 0; x < edge && !all_beyond; ++x) {
+      for (int step = -reach(0); step <= reach(0); ++step) {
+        const int from = x + step + margin * edge;
+        lower(squares.data() + x * plane, blocks_[index + from / edge], from % edge * plane, plane,
+              squares_[0][std::abs(step)]);
+      }
+    }
+    std::array<std::int32_t, volume> values{};
+    for (int i = 0; i < volume; ++i) {
+      if (bits[i / plane] >> (i % plane) & 1) values[i] = valueAt(squares[i]);
+    }
+    const auto same = [&](std::int32_t value) { return value == values[0]; };
+    if (all(bits) && std::all_of(values.begin(), values.end(), same)) {
+      return {origin, nullptr, values[0]};
+    }
+    Output output{origin, std::make_unique<Int32Leaf>(origin, 0, false), 0};
+    for (int x = 0; x < edge; ++x) {
+      output.leaf->getValueMask().getWord<openvdb::Index64>(x) = bits[x];
+    }
+    std::copy(values.begin(), values.end(), output.leaf->buffer().data());
+    return output;
+  }
+
+  [[nodiscard]] std::int32_t valueAt(float square) const {
+    for (std::size_t i = 0; i < limits_.size(); ++i) {
+      if (square <= limits_[i]) return bands_[i].value;
+    }
+    return beneath_;
+  }
+
+  openvdb::BoolGrid::ConstAccessor accessor_;
+  ZRange valid_;
+  std::span<const DepthBand> bands_;
+  std::int32_t beneath_;
+  int x_begin_;
+  int x_blocks_;
+  std::array<std::vector<float>, 3> squares_;  ///< per axis, (i · pitch)² within reach
+  std::vector<float> limits_;                  ///< per band, squared
+  std::vector<Block> blocks_;                  ///< the row after the pass along y, with margins
+  std::vector<Block> along_y_;                 ///< the columns of blocks that one block needs
+};
+
+}  // namespace
+
+int depthReach(std::span<const DepthBand> bands, double layer_mm) {
+  return bands.empty() ? 0 : stepsWithin(bands.back().to_mm, layer_mm);
+}
+
+openvdb::Int32Grid::Ptr valueByDepth(const openvdb::BoolGrid& solid, const openvdb::Vec3d& pitch_mm,
+                                     const openvdb::CoordBBox& region, ZRange core, ZRange valid,
+                                     std::span<const DepthBand> bands, std::int32_t beneath) {
+  auto result = openvdb::Int32Grid::create(0);
+  result->setTransform(solid.transform().copy());
+  if (region.empty() || core.empty()) return result;
+  const int y_begin = leafOrigin(region.min().y());
+  const int strips = (region.max().y() - y_begin) / edge + 1;
+  const ZRange layers = alignedToLeaves(core);
+  std::vector<std::vector<Output>> outputs(strips);
+  tbb::parallel_for(tbb::blocked_range<int>(0, strips), [&](const tbb::blocked_range<int>& range) {
+    StripTransform transform(solid, pitch_mm, region, valid, bands, beneath);
+    for (int strip = range.begin(); strip < range.end(); ++strip) {
+      for (int z = layers.begin; z < layers.end; z += edge) {
+        transform.run(y_begin + strip * edge, z, outputs[strip]);
+      }
+    }
+  });
+  for (std::vector<Output>& strip : outputs) {
+    for (Output& output : strip) {
+      if (output.leaf) {
+        result->tree().addLeaf(output.leaf.release());
+      } else {
+        result->tree().addTile(1, output.origin, output.value, true);
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace vdbdither

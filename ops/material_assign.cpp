@@ -1,0 +1,219 @@
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <sstream>
+
+#include <openvdb/tree/LeafManager.h>
+
+#include "io/material_table.h"
+#include "io/printer_profile.h"
+#include "ops/kernels/depth_bands.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/find_grid.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::BoolGrid;
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::Int32Grid;
+using openvdb::Int32Tree;
+
+/// The entries of a list; commas between the numbers of a colour do not part them.
+std::vector<std::string> entriesOf(const std::string& text) {
+  std::vector<std::string> entries;
+  std::stringstream stream(text);
+  for (std::string part; std::getline(stream, part, ',');) {
+    const bool number = !part.empty() && std::all_of(part.begin(), part.end(),
+                                                     [](char c) { return c >= '0' && c <= '9'; });
+    if (number && !entries.empty() && entries.back().find('=') != std::string::npos) {
+      entries.back() += "," + part;
+    } else {
+      entries.push_back(part);
+    }
+  }
+  return entries;
+}
+
+/// `material` from `solid`.
+class MaterialAssign : public Filter {
+ public:
+  void declare(Options& options) override {
+    options.text("material", material_, "NAME",
+                 "One material for all: a name of the printer's, or NAME=#rrggbb. The printer's "
+                 "first, else white, unless given.");
+    options.text("parts", parts_, "NAME,...",
+                 "A material for each part, in the order of the meshes.");
+    options.text("shell", shell_, "MM:NAME,...",
+                 "Layers under the printed surface from the outside in, each with its thickness, "
+                 "as in 0.2mm:white,0.5mm:black. "
+                 "Depth is the distance from a voxel's centre to that of the nearest empty voxel.");
+    options.text("core", core_, "NAME", "What lies beneath the shell.");
+  }
+
+  Schema plan(const Schema& in) override {
+    lattice_ = in.lattice;
+    const auto solid = findGrid<BoolGrid>(in.grids, "solid");
+    if (shell_.empty() != core_.empty())
+      throw UsageError("--shell and --core go together; give both");
+    if (!shell_.empty() + !parts_.empty() + !material_.empty() > 1) {
+      throw UsageError("--material, --parts and --shell exclude each other; give one");
+    }
+    if (!parts_.empty()) findGrid<Int32Grid>(in.grids, "part");
+    planTable(in);
+
+    Schema out = in;
+    auto material = Int32Grid::create(0);
+    material->setName("material");
+    material->setTransform(solid->transform().copy());
+    out.grids["material"] = material;
+    out.metadata[std::string(materials_key)] = toJson(table_);
+    return out;
+  }
+
+  [[nodiscard]] std::vector<Read> reads() const override {
+    std::vector<Read> reads = {
+        {"solid", Reach::stencil(depthReach(bands_, lattice_.pitch_mm.z()))}};
+    if (!parts_.empty()) reads.push_back({"part", Reach::point()});
+    return reads;
+  }
+
+  [[nodiscard]] Grids run(const Slab& in) const override {
+    const auto solid = findGrid<BoolGrid>(in.grids, "solid");
+    Int32Grid::Ptr material;
+    if (!bands_.empty()) {
+      material = valueByDepth(*solid, lattice_.pitch_mm, lattice_.box, in.core, in.valid, bands_,
+                              static_cast<std::int32_t>(table_.size()));
+    } else {
+      material = Int32Grid::create(
+          std::make_shared<Int32Tree>(solid->tree(), 0, 1, openvdb::TopologyCopy()));
+      material->setTransform(solid->transform().copy());
+      if (!parts_.empty())
+        takeParts(material->tree(), findGrid<Int32Grid>(in.grids, "part")->tree());
+    }
+    material->setName("material");
+    return {{"material", material}};
+  }
+
+ private:
+  void planTable(const Schema& in) {
+    std::vector<Material> known;
+    if (const auto printer = in.metadata.find("vdbdither:printer"); printer != in.metadata.end()) {
+      known = printerProfileFromJson(printer->second).materials;
+    }
+    table_.clear();
+    bands_.clear();
+    if (!parts_.empty()) {
+      for (const std::string& name : entriesOf(parts_)) add("--parts", name, known);
+    } else if (!shell_.empty()) {
+      double depth_mm = 0;
+      for (const std::string& layer : entriesOf(shell_)) {
+        const std::size_t colon = layer.find(':');
+        if (colon == std::string::npos) {
+          throw UsageError("--shell: '" + layer +
+                           "' must be a thickness and a material, as in 0.5mm:white");
+        }
+        const double thickness_mm = parseLengthMm(layer.substr(0, colon));
+        if (!(thickness_mm > 0))
+          throw UsageError("--shell: '" + layer + "' must be thicker than zero");
+        depth_mm += thickness_mm;
+        add("--shell", layer.substr(colon + 1), known);
+        bands_.push_back({depth_mm, static_cast<std::int32_t>(table_.size())});
+      }
+      add("--core", core_, known);
+    } else {
+      add("--material",
+          !material_.empty() ? material_
+          : known.empty()    ? "white"
+                             : known.front().name,
+          known);
+    }
+  }
+
+  void add(const std::string& option, const std::string& text, const std::vector<Material>& known) {
+    try {
+      table_.push_back(parseMaterial(text, known));
+    } catch (const UsageError& error) {
+      throw UsageError(option + ": " + error.what());
+    }
+    for (const Material& other : table_) {
+      if (other.name == table_.back().name && other.rgba != table_.back().rgba) {
+        throw UsageError(option + ": '" + other.name + "' has two colours");
+      }
+    }
+  }
+
+  /// Replaces the voxels of `material` by the parts they belong to. A voxel of no part, or of one
+  /// beyond the list, takes the last material.
+  void takeParts(Int32Tree& material, const Int32Tree& part) const {
+    const auto count = static_cast<std::int32_t>(table_.size());
+    std::atomic<std::uint64_t> strays = 0;
+    const auto materialOf = [&](std::int32_t index, std::uint64_t voxels) {
+      if (index >= 1 && index <= count) return index;
+      strays += voxels;
+      return count;
+    };
+    splitTiles(material, part);
+    auto tile = material.beginValueOn();
+    tile.setMaxDepth(Int32Tree::ValueOnIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile)
+      tile.setValue(materialOf(part.getValue(tile.getCoord()), tile.getVoxelCount()));
+    openvdb::tree::LeafManager<Int32Tree> leaves(material);
+    leaves.foreach ([&](Int32Tree::LeafNodeType& leaf, std::size_t) {
+      const openvdb::tree::ValueAccessor<const Int32Tree> accessor(part);
+      for (auto voxel = leaf.beginValueOn(); voxel; ++voxel) {
+        voxel.setValue(materialOf(accessor.getValue(voxel.getCoord()), 1));
+      }
+    });
+    if (strays > 0) report().count("voxels_of_no_part", static_cast<double>(strays));
+  }
+
+  /// Breaks the active tiles of `material` up so that each lies within one tile of `part`, or is a
+  /// leaf.
+  static void splitTiles(Int32Tree& material, const Int32Tree& part) {
+    const Int32Tree& before = material;
+    std::vector<CoordBBox> tiles;
+    auto tile = before.cbeginValueOn();
+    tile.setMaxDepth(Int32Tree::ValueOnCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) tiles.push_back(tile.getBoundingBox());
+    const openvdb::tree::ValueAccessor<const Int32Tree> accessor(part);
+    for (const CoordBBox& box : tiles) {
+      for (int x = box.min().x(); x <= box.max().x(); x += leaf_layers) {
+        for (int y = box.min().y(); y <= box.max().y(); y += leaf_layers) {
+          for (int z = box.min().z(); z <= box.max().z(); z += leaf_layers) {
+            const Coord at(x, y, z);
+            if (accessor.probeConstLeaf(at)) {
+              material.touchLeaf(at);
+            } else if (box.dim().x() > leaf_layers) {
+              material.addTile(1, at, 1, true);
+            }
+          }
+        }
+      }
+    }
+  }
+
+  std::string material_;
+  std::string parts_;
+  std::string shell_;
+  std::string core_;
+
+  Lattice lattice_;
+  MaterialTable table_;
+  std::vector<DepthBand> bands_;  ///< of the shell; the core is the last of the table
+};
+
+}  // namespace
+
+extern const OperatorInfo material_assign;
+const OperatorInfo material_assign = {
+    "material-assign", "Give every printed voxel a material",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign --shell 0.5mm:white "
+    "--core clear ! slice-export out",
+    [] { return std::unique_ptr<Operator>(std::make_unique<MaterialAssign>()); }};
+
+}  // namespace vdbdither

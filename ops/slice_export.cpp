@@ -1,0 +1,394 @@
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
+
+#include "io/digest.h"
+#include "io/exr.h"
+#include "io/material_table.h"
+#include "io/png_runs.h"
+#include "io/slice_runs.h"
+#include "io/stack_preview.h"
+#include "io/staged_output.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/find_grid.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+using nlohmann::ordered_json;
+
+std::uint32_t pixel(const std::array<std::uint8_t, 4>& colour) {
+  return rgba(colour[0], colour[1], colour[2], colour[3]);
+}
+
+/// A file of the stack, by its place in it.
+struct SliceFile {
+  std::string name;
+  std::string material;  ///< whose voxels it shows; empty: all
+  Bytes bytes;
+  std::string sha256;
+};
+
+/// A layer on its way through the threads.
+struct LayerOutput {
+  int z = 0;
+  RunImage image;
+  std::vector<SliceFile> files;
+  std::vector<std::uint64_t> voxels;  ///< per value of the image
+};
+
+class SliceExport : public Sink {
+ public:
+  void declare(Options& options) override {
+    options.positional("folder", folder_, "Folder that will hold the stack.");
+    options.choice("format", format_, {"png", "png1", "png8", "exr"},
+                   "png: 32-bit RGBA in the colours of the materials. png1: a stack of 1 bit a "
+                   "voxel for each material, in a folder "
+                   "of its own. png8: grey, 255 where printed, else 0. exr: material index, and "
+                   "distance and normal where "
+                   "they are there.");
+    options.text("prefix", prefix_, "TEXT", "What the file names begin with.");
+    options.integer("digits", digits_, 1, 9, "Digits of the running number, zeros in front.");
+    options.integer("first", first_, 0, 1000000, "Number of the lowest layer.");
+    options.integer("padding", padding_, 0, 100000, "Empty voxels added on each side in x and y.");
+    options.flag("flip-x", flip_x_,
+                 "Mirror left to right. By default a slice is seen from above: x to the right.");
+    options.flag("flip-y", flip_y_,
+                 "Mirror top to bottom. By default a slice is seen from above: the top row has the "
+                 "greatest y.");
+    options.text("background", background_, "COLOUR",
+                 "Colour of what is not printed, in png: #rrggbb, or r,g,b,a of 0 to 255.");
+    options.flag("overwrite", overwrite_, "Replace a stack that is there already.");
+  }
+
+  void plan(const Schema& in) override {
+    schema_ = in;
+    if (in.lattice.box.empty())
+      throw DataError("there is nothing to slice: the lattice has no voxels");
+    planMaterials();
+    planColours();
+    if (prefix_.find('/') != std::string::npos)
+      throw UsageError("--prefix: '" + prefix_ + "' must not hold a '/'");
+    StagedOutput::check(folder_, StagedOutput::Kind::folder, overwrite_);
+    const std::filesystem::path folder = folder_;
+    if (std::filesystem::exists(folder) && !std::filesystem::is_empty(folder) &&
+        !std::filesystem::exists(folder / "manifest.json")) {
+      throw UsageError("'" + folder_ +
+                       "' holds no manifest.json, so it is no stack of slices to overwrite; name "
+                       "another folder");
+    }
+    frame_ = {in.lattice.box, padding_, flip_x_, flip_y_};
+    if (static_cast<std::int64_t>(in.lattice.box.dim().x()) + 2 * padding_ > 1 << 24 ||
+        static_cast<std::int64_t>(in.lattice.box.dim().y()) + 2 * padding_ > 1 << 24) {
+      throw UsageError("slices would be more than 16777216 voxels wide");
+    }
+    if (format_ == "exr") planChannels();
+    std::vector<std::uint32_t> display = {0};
+    for (const Material& material : materials_) display.push_back(pixel(material.rgba));
+    preview_.emplace(in.lattice.pitch_mm, frame_.width(), frame_.height(), in.lattice.layers(),
+                     display);
+    voxels_.assign(materials_.size() + 1, 0);
+  }
+
+  void write(const Slab& in) override {
+    if (!staged_) staged_.emplace(folder_, StagedOutput::Kind::folder);
+    const int together =
+        leaf_layers * ((tbb::this_task_arena::max_concurrency() + leaf_layers - 1) / leaf_layers);
+    for (int z = in.core.begin; z < in.core.end;) {
+      const int end =
+          std::min(in.core.end, alignedToLeaves({z, z + together - leaf_layers + 1}).end);
+      writeLayers(in, {z, end});
+      z = end;
+    }
+  }
+
+  void finish() override {
+    if (!staged_) throw DataError("no layer came to slice");
+    staged_->write("preview.png", encodePng(preview_->picture(), {}));
+    const std::string manifest = manifestText();
+    staged_->write("manifest.json",
+                   {reinterpret_cast<const std::uint8_t*>(manifest.data()), manifest.size()});
+    staged_->commit();
+    staged_.reset();
+    report().count("slices", static_cast<double>(last_layer_ - first_layer_ + 1));
+    for (std::size_t i = 0; i < materials_.size(); ++i) {
+      report().count("voxels of " + materials_[i].name, static_cast<double>(voxels_[i + 1]));
+    }
+  }
+
+ private:
+  void planMaterials() {
+    if (schema_.grids.contains("material")) {
+      findGrid<openvdb::Int32Grid>(schema_.grids, "material");
+      const auto table = schema_.metadata.find(materials_key);
+      if (table == schema_.metadata.end()) {
+        throw DataError(
+            "the grid 'material' comes without its table of materials; make it with "
+            "material-assign");
+      }
+      materials_ = materialTableFromJson(table->second);
+      source_ = "material";
+    } else if (schema_.grids.contains("solid")) {
+      findGrid<openvdb::BoolGrid>(schema_.grids, "solid");
+      materials_ = {{"solid", {240, 240, 240, 255}}};
+      source_ = "solid";
+    } else {
+      throw UsageError(
+          "needs a grid 'material' or 'solid'; put dither, and material-assign where there are "
+          "materials, before it");
+    }
+  }
+
+  void planColours() {
+    try {
+      background_rgba_ = parseColour(background_);
+    } catch (const UsageError& error) {
+      throw UsageError(std::string("--background: ") + error.what());
+    }
+    palette_ = {pixel(background_rgba_)};
+    for (const Material& material : materials_) {
+      palette_.push_back(pixel(material.rgba));
+      if (format_ == "png" && palette_.back() == palette_.front()) {
+        throw UsageError("--background: the material '" + material.name + "' has the colour " +
+                         background_ + "; choose another");
+      }
+    }
+  }
+
+  /// Channels of exr, and the grids behind them.
+  void planChannels() {
+    channels_ = {{"material", true}};
+    if (schema_.grids.contains("surface")) {
+      findGrid<openvdb::FloatGrid>(schema_.grids, "surface");
+      channels_.push_back({"distance", false});
+    }
+    if (schema_.grids.contains("N")) {
+      findGrid<openvdb::Vec3SGrid>(schema_.grids, "N");
+      for (const char* name : {"N.x", "N.y", "N.z"}) channels_.push_back({name, true});
+    }
+  }
+
+  [[nodiscard]] std::string fileName(int z, const char* extension) const {
+    std::string number = std::to_string(first_ + z - schema_.lattice.box.min().z());
+    if (number.size() < static_cast<std::size_t>(digits_))
+      number.insert(0, digits_ - number.size(), '0');
+    return prefix_ + number + extension;
+  }
+
+  void writeLayers(const Slab& in, ZRange layers) {
+    std::vector<RunImage> images =
+        source_ == "material"
+            ? sliceRuns(*findGrid<openvdb::Int32Grid>(in.grids, source_), frame_, layers)
+            : sliceRuns(*findGrid<openvdb::BoolGrid>(in.grids, source_), frame_, layers);
+    int next = layers.begin;
+    using Layer = std::shared_ptr<LayerOutput>;
+    const auto take = [&](tbb::flow_control& control) -> Layer {
+      if (next == layers.end) {
+        control.stop();
+        return nullptr;
+      }
+      auto layer = std::make_shared<LayerOutput>();
+      layer->z = next;
+      layer->image = std::move(images[next - layers.begin]);
+      ++next;
+      return layer;
+    };
+    const auto encode = [&](Layer layer) {
+      countVoxels(*layer);
+      encodeLayer(in, *layer);
+      for (SliceFile& file : layer->files) {
+        Digest digest;
+        digest.update(file.bytes.data(), file.bytes.size());
+        file.sha256 = hexText(digest.finish());
+      }
+      return layer;
+    };
+    const auto store = [&](const Layer& layer) { storeLayer(*layer); };
+    tbb::parallel_pipeline(
+        2 * tbb::this_task_arena::max_concurrency(),
+        tbb::make_filter<void, Layer>(tbb::filter_mode::serial_in_order, take) &
+            tbb::make_filter<Layer, Layer>(tbb::filter_mode::parallel, encode) &
+            tbb::make_filter<Layer, void>(tbb::filter_mode::serial_in_order, store));
+  }
+
+  void countVoxels(LayerOutput& layer) const {
+    layer.voxels.assign(materials_.size() + 1, 0);
+    for (std::uint32_t y = 0; y < layer.image.height; ++y) {
+      std::uint32_t begin = 0;
+      for (const Run& run : layer.image.row(y)) {
+        if (run.value > materials_.size()) {
+          throw DataError("layer " + std::to_string(layer.z) + " holds material " +
+                          std::to_string(static_cast<std::int32_t>(run.value)) +
+                          ", but the table of materials ends at " +
+                          std::to_string(materials_.size()));
+        }
+        layer.voxels[run.value] += run.end - begin;
+        begin = run.end;
+      }
+    }
+  }
+
+  void encodeLayer(const Slab& in, LayerOutput& layer) const {
+    const openvdb::Vec3d& pitch = schema_.lattice.pitch_mm;
+    if (format_ == "exr") {
+      layer.files.push_back({fileName(layer.z, ".exr"), "", encodeChannels(in, layer), ""});
+    } else if (format_ == "png1") {
+      for (std::size_t i = 1; i <= materials_.size(); ++i) {
+        std::vector<std::uint32_t> only(materials_.size() + 1, 0);
+        only[i] = 1;
+        const std::string& name = materials_[i - 1].name;
+        layer.files.push_back(
+            {name + "/" + fileName(layer.z, ".png"), name,
+             encodePng(layer.image, {PngPixels::grey1, only, pitch.x(), pitch.y()}), ""});
+      }
+    } else if (format_ == "png8") {
+      std::vector<std::uint32_t> grey(materials_.size() + 1, 255);
+      grey[0] = 0;
+      layer.files.push_back({fileName(layer.z, ".png"), "",
+                             encodePng(layer.image, {PngPixels::grey8, grey, pitch.x(), pitch.y()}),
+                             ""});
+    } else {
+      layer.files.push_back(
+          {fileName(layer.z, ".png"), "",
+           encodePng(layer.image, {PngPixels::rgba8, palette_, pitch.x(), pitch.y()}), ""});
+    }
+  }
+
+  [[nodiscard]] Bytes encodeChannels(const Slab& in, const LayerOutput& layer) const {
+    const openvdb::CoordBBox& box = frame_.box;
+    const auto fillRow = [&](std::uint32_t row, std::span<float> values, const auto& grid,
+                             const auto& convert) {
+      std::fill(values.begin(), values.end(), convert(grid.background()));
+      const int from_top = static_cast<int>(row) - padding_;
+      if (from_top < 0 || from_top >= box.dim().y()) return;
+      const auto accessor = grid.getConstAccessor();
+      openvdb::Coord at(0, flip_y_ ? box.min().y() + from_top : box.max().y() - from_top, layer.z);
+      for (int i = 0; i < box.dim().x(); ++i) {
+        at.x() = flip_x_ ? box.max().x() - i : box.min().x() + i;
+        values[padding_ + i] = convert(accessor.getValue(at));
+      }
+    };
+    const auto fill = [&](std::uint32_t row, std::size_t channel, std::span<float> values) {
+      const std::string& name = channels_[channel].name;
+      if (name == "material") {
+        std::uint32_t begin = 0;
+        for (const Run& run : layer.image.row(row)) {
+          std::fill(values.begin() + begin, values.begin() + run.end,
+                    static_cast<float>(run.value));
+          begin = run.end;
+        }
+      } else if (name == "distance") {
+        fillRow(row, values, *findGrid<openvdb::FloatGrid>(in.grids, "surface"),
+                [](float value) { return value; });
+      } else {
+        const int axis = name.back() - 'x';
+        fillRow(row, values, *findGrid<openvdb::Vec3SGrid>(in.grids, "N"),
+                [axis](const openvdb::Vec3s& normal) { return normal[axis]; });
+      }
+    };
+    return encodeExr(frame_.width(), frame_.height(),
+                     schema_.lattice.pitch_mm.x() / schema_.lattice.pitch_mm.y(), channels_, fill);
+  }
+
+  void storeLayer(LayerOutput& layer) {
+    if (!slices_.empty() && layer.z != last_layer_ + 1) {
+      throw DataError("layers " + std::to_string(last_layer_ + 1) + " to " +
+                      std::to_string(layer.z - 1) + " are missing");
+    }
+    if (slices_.empty()) first_layer_ = layer.z;
+    last_layer_ = layer.z;
+    for (const SliceFile& file : layer.files) {
+      staged_->write(file.name, file.bytes);
+      ordered_json entry = {{"layer", layer.z}, {"file", file.name}, {"sha256", file.sha256}};
+      if (!file.material.empty()) entry["material"] = file.material;
+      slices_.push_back(std::move(entry));
+    }
+    std::uint64_t filled = 0;
+    for (std::size_t value = 0; value < voxels_.size(); ++value) {
+      voxels_[value] += layer.voxels[value];
+      if (value > 0) filled += layer.voxels[value];
+    }
+    preview_->add(layer.z, std::move(layer.image), filled);
+  }
+
+  [[nodiscard]] std::string manifestText() const {
+    const Lattice& lattice = schema_.lattice;
+    const auto triple = [](const auto& v) { return ordered_json::array({v[0], v[1], v[2]}); };
+    const auto metadata = [&](std::string_view key) {
+      const auto entry = schema_.metadata.find(key);
+      return entry == schema_.metadata.end() ? std::string() : entry->second;
+    };
+    ordered_json manifest;
+    manifest["creator"] = metadata("creator");
+    const ordered_json printer = ordered_json::parse(metadata("vdbdither:printer"), nullptr, false);
+    manifest["printer"] = printer.is_discarded() ? ordered_json() : printer;
+    manifest["format"] = format_;
+    manifest["pitch_mm"] = triple(lattice.pitch_mm);
+    manifest["origin_mm"] = triple(lattice.origin_mm);
+    manifest["size"] = {frame_.width(), frame_.height(), last_layer_ - first_layer_ + 1};
+    manifest["first_layer"] = first_layer_;
+    manifest["box"] = {{"min", triple(lattice.box.min())}, {"max", triple(lattice.box.max())}};
+    manifest["padding"] = padding_;
+    manifest["flip_x"] = flip_x_;
+    manifest["flip_y"] = flip_y_;
+    manifest["background"] = background_rgba_;
+    manifest["materials"] = ordered_json::array();
+    for (std::size_t i = 0; i < materials_.size(); ++i) {
+      manifest["materials"].push_back(
+          {{"index", i + 1},
+           {"name", materials_[i].name},
+           {"rgba", materials_[i].rgba},
+           {"voxels", voxels_[i + 1]},
+           {"ml", static_cast<double>(voxels_[i + 1]) * lattice.pitch_mm.product() / 1000}});
+    }
+    manifest["history"] = metadata("vdbdither:history");
+    manifest["slices"] = slices_;
+    return manifest.dump(1) + "\n";
+  }
+
+  std::string folder_;
+  std::string format_ = "png";
+  std::string prefix_ = "slice_";
+  int digits_ = 5;
+  int first_ = 0;
+  int padding_ = 0;
+  bool flip_x_ = false;
+  bool flip_y_ = false;
+  std::string background_ = "0,0,0,255";
+  bool overwrite_ = false;
+
+  Schema schema_;
+  SliceFrame frame_;
+  std::string source_;  ///< the grid that is sliced
+  MaterialTable materials_;
+  std::array<std::uint8_t, 4> background_rgba_{};
+  std::vector<std::uint32_t> palette_;  ///< per material index; 0 is the background
+  std::vector<ExrChannel> channels_;
+
+  std::optional<StagedOutput> staged_;
+  std::optional<StackPreview> preview_;
+  ordered_json slices_ = ordered_json::array();
+  std::vector<std::uint64_t> voxels_;
+  int first_layer_ = 0;
+  int last_layer_ = 0;
+};
+
+}  // namespace
+
+extern const OperatorInfo slice_export;
+const OperatorInfo slice_export = {
+    "slice-export", "Write one image per layer, with a manifest and a preview",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign ! slice-export out",
+    [] { return std::unique_ptr<Operator>(std::make_unique<SliceExport>()); }};
+
+}  // namespace vdbdither

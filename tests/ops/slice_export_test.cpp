@@ -1,0 +1,317 @@
+#include <filesystem>
+#include <memory>
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <tbb/global_control.h>
+
+#include "io/digest.h"
+#include "io/material_table.h"
+#include "tests/support/drawn_grids.h"
+#include "tests/support/png_reader.h"
+#include "tests/support/scratch_folder.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/operator.h"
+#include "vdbdither/registry.h"
+
+namespace vdbdither {
+namespace {
+
+namespace fs = std::filesystem;
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using test::drawnMaterial;
+using test::fileBytes;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+struct Job {
+  Schema schema;
+  Grids grids;
+};
+
+Job jobOf(const openvdb::Int32Grid::Ptr& material, const CoordBBox& box) {
+  Job job;
+  job.schema.lattice = {{0.042, 0.084, 0.022}, {0, 0, 0}, box};
+  job.schema.grids["material"] = openvdb::Int32Grid::create(0);
+  job.schema.metadata[std::string(materials_key)] =
+      toJson({{"white", {240, 240, 240, 255}}, {"black", {26, 26, 29, 255}}});
+  job.schema.metadata["vdbdither:history"] = "drawn";
+  job.grids["material"] = material;
+  return job;
+}
+
+Job smallJob() {
+  return jobOf(drawnMaterial({{"..1", "221"}, {"...", "1.."}}, 4),
+               CoordBBox(Coord(0, 0, 4), Coord(2, 1, 5)));
+}
+
+/// Balls of two materials over several leaves.
+Job largeJob() {
+  auto material = openvdb::Int32Grid::create(0);
+  for (auto voxel = CoordBBox(Coord(-20, -3, -11), Coord(40, 30, 30)).begin(); voxel; ++voxel) {
+    const openvdb::Vec3d at = (*voxel).asVec3d();
+    if ((at - openvdb::Vec3d(10, 14, 9)).length() < 15)
+      material->tree().setValue(*voxel, (*voxel).x() < 12 ? 1 : 2);
+  }
+  return jobOf(material, CoordBBox(Coord(-20, -3, -11), Coord(40, 30, 30)));
+}
+
+/// A sink ready to plan.
+struct Export {
+  explicit Export(std::vector<std::string> arguments) : made(findOperator("slice-export").make()) {
+    Options options;
+    made->declare(options);
+    options.parse(arguments);
+  }
+  Sink& sink() { return static_cast<Sink&>(*made); }
+
+  void run(const Job& job, int height = 8) {
+    sink().plan(job.schema);
+    for (const Slab& slab : test::cutIntoSlabs(job.grids, job.schema.lattice, height))
+      sink().write(slab);
+    sink().finish();
+  }
+
+  std::unique_ptr<Operator> made;
+};
+
+TEST(SliceExport, SlicesAreSeenFromAboveInTheColoursOfTheMaterials) {
+  const test::ScratchFolder scratch;
+  Export({scratch / "out"}).run(smallJob());
+  const test::PngImage image = test::readPng(fileBytes(scratch / "out/slice_00000.png"));
+  EXPECT_EQ(image.width, 3U);
+  EXPECT_EQ(image.height, 2U);
+  EXPECT_EQ(image.colour_type, 6);
+  EXPECT_EQ(image.dots_per_metre_x, 23810U);
+  EXPECT_EQ(image.dots_per_metre_y, 11905U);
+  EXPECT_THAT(image.rows, ElementsAre(0, 0, 0, 255, 0, 0, 0, 255, 240, 240, 240, 255,  //
+                                      26, 26, 29, 255, 26, 26, 29, 255, 240, 240, 240, 255));
+  EXPECT_TRUE(fs::exists(scratch / "out/slice_00001.png"));
+}
+
+TEST(SliceExport, NamesOrientationPaddingAndBackgroundAreOptions) {
+  const test::ScratchFolder scratch;
+  Export({scratch / "out", "--prefix", "p", "--digits", "1", "--first", "9", "--flip-x", "--flip-y",
+          "--padding", "1", "--background", "#01020304"})
+      .run(smallJob());
+  const test::PngImage image = test::readPng(fileBytes(scratch / "out/p10.png"));
+  EXPECT_TRUE(fs::exists(scratch / "out/p9.png"));
+  ASSERT_EQ(image.width, 5U);
+  ASSERT_EQ(image.height, 4U);
+  for (std::uint32_t y = 0; y < 4; ++y) {
+    for (std::uint32_t x = 0; x < 5; ++x) {
+      const bool white = x == 3 && y == 1;
+      EXPECT_EQ(image.rows[(y * 5 + x) * 4], white ? 240 : 1) << x << " " << y;
+    }
+  }
+}
+
+TEST(SliceExport, GreyShowsWhatIsPrinted) {
+  const test::ScratchFolder scratch;
+  Export({scratch / "out", "--format", "png8"}).run(smallJob());
+  const test::PngImage image = test::readPng(fileBytes(scratch / "out/slice_00000.png"));
+  EXPECT_EQ(image.colour_type, 0);
+  EXPECT_EQ(image.bit_depth, 8);
+  EXPECT_THAT(image.rows, ElementsAre(0, 0, 255, 255, 255, 255));
+}
+
+TEST(SliceExport, OneBitMakesAStackForEachMaterial) {
+  const test::ScratchFolder scratch;
+  Export({scratch / "out", "--format", "png1"}).run(smallJob());
+  const test::PngImage white = test::readPng(fileBytes(scratch / "out/white/slice_00000.png"));
+  EXPECT_EQ(white.bit_depth, 1);
+  EXPECT_THAT(white.rows, ElementsAre(0b00100000, 0b00100000));
+  EXPECT_THAT(test::readPng(fileBytes(scratch / "out/black/slice_00000.png")).rows,
+              ElementsAre(0, 0b11000000));
+}
+
+TEST(SliceExport, SolidAloneIsOneMaterial) {
+  const test::ScratchFolder scratch;
+  Job job = smallJob();
+  job.grids = {{"solid", test::solidOf(*drawnMaterial({{"12"}}, 4))}};
+  job.schema.grids = {{"solid", openvdb::BoolGrid::create(false)}};
+  Export({scratch / "out", "--format", "png8"}).run(job);
+  EXPECT_THAT(test::readPng(fileBytes(scratch / "out/slice_00000.png")).rows,
+              ElementsAre(0, 0, 0, 255, 255, 0));
+}
+
+TEST(SliceExport, ExrHoldsMaterialDistanceAndNormal) {
+  const test::ScratchFolder scratch;
+  Job job = smallJob();
+  auto surface = openvdb::FloatGrid::create(0.5F);
+  surface->tree().setValue(Coord(1, 0, 4), -0.125F);
+  auto normals = openvdb::Vec3SGrid::create();
+  normals->tree().setValue(Coord(2, 1, 4), openvdb::Vec3s(0.5F, -0.25F, 1));
+  job.grids["surface"] = surface;
+  job.grids["N"] = normals;
+  job.schema.grids["surface"] = openvdb::FloatGrid::create(0.5F);
+  job.schema.grids["N"] = openvdb::Vec3SGrid::create();
+  Export({scratch / "out", "--format", "exr"}).run(job);
+
+  Imf::InputFile file((scratch / "out/slice_00000.exr").c_str());
+  EXPECT_FLOAT_EQ(file.header().pixelAspectRatio(), 0.5F);
+  EXPECT_EQ(file.header().channels()["distance"].type, Imf::FLOAT);
+  EXPECT_EQ(file.header().channels()["material"].type, Imf::HALF);
+  std::map<std::string, std::array<float, 6>> channels;
+  Imf::FrameBuffer buffer;
+  for (const char* name : {"material", "distance", "N.x", "N.y", "N.z"}) {
+    buffer.insert(name,
+                  Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(channels[name].data()), 4, 12));
+  }
+  file.setFrameBuffer(buffer);
+  file.readPixels(0, 1);
+  EXPECT_THAT(channels["material"], ElementsAre(0, 0, 1, 2, 2, 1));
+  EXPECT_THAT(channels["distance"], ElementsAre(0.5F, 0.5F, 0.5F, 0.5F, -0.125F, 0.5F));
+  EXPECT_THAT(channels["N.x"], ElementsAre(0, 0, 0.5F, 0, 0, 0));
+  EXPECT_THAT(channels["N.y"], ElementsAre(0, 0, -0.25F, 0, 0, 0));
+  EXPECT_THAT(channels["N.z"], ElementsAre(0, 0, 1, 0, 0, 0));
+}
+
+TEST(SliceExport, ManifestTellsWhatIsThere) {
+  const test::ScratchFolder scratch;
+  Export({scratch / "out", "--padding", "2"}).run(smallJob());
+  const std::vector<std::uint8_t> bytes = fileBytes(scratch / "out/manifest.json");
+  const auto manifest = nlohmann::json::parse(bytes);
+  EXPECT_EQ(manifest["format"], "png");
+  EXPECT_EQ(manifest["pitch_mm"], (nlohmann::json{0.042, 0.084, 0.022}));
+  EXPECT_EQ(manifest["size"], (nlohmann::json{7, 6, 2}));
+  EXPECT_EQ(manifest["first_layer"], 4);
+  EXPECT_EQ(manifest["history"], "drawn");
+  EXPECT_EQ(manifest["materials"][0]["name"], "white");
+  EXPECT_EQ(manifest["materials"][0]["voxels"], 3);
+  EXPECT_EQ(manifest["materials"][1]["voxels"], 2);
+  ASSERT_EQ(manifest["slices"].size(), 2U);
+  for (const auto& slice : manifest["slices"]) {
+    const std::vector<std::uint8_t> file =
+        fileBytes(scratch / ("out/" + slice["file"].get<std::string>()));
+    Digest digest;
+    digest.update(file.data(), file.size());
+    EXPECT_EQ(slice["sha256"], hexText(digest.finish()));
+  }
+}
+
+TEST(SliceExport, PreviewFitsAScreenAndShowsEveryMaterial) {
+  const test::ScratchFolder scratch;
+  Export({scratch / "out"}).run(largeJob());
+  const test::PngImage image = test::readPng(fileBytes(scratch / "out/preview.png"));
+  EXPECT_LE(image.width, 1200U);
+  EXPECT_LE(image.height, 1000U);
+  // The slice, on the right, holds both colours as they are.
+  int white = 0;
+  int black = 0;
+  for (std::size_t i = 0; i < image.rows.size(); i += 4) {
+    white += image.rows[i] == 240 && image.rows[i + 2] == 240;
+    black += image.rows[i] == 26 && image.rows[i + 2] == 29;
+  }
+  EXPECT_GT(white, 10000);
+  EXPECT_GT(black, 10000);
+}
+
+TEST(SliceExport, SlabHeightsAndThreadsGiveTheSameFiles) {
+  for (const char* format : {"png", "png1", "exr"}) {
+    const test::ScratchFolder scratch;
+    Export({scratch / "8", "--format", format}).run(largeJob(), 8);
+    Export({scratch / "16", "--format", format}).run(largeJob(), 16);
+    {
+      const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+      Export({scratch / "64", "--format", format}).run(largeJob(), 64);
+    }
+    const auto files = test::filesUnder(scratch / "8");
+    EXPECT_EQ(files.size(), (std::string(format) == "png1" ? 84U : 42U) + 2);
+    EXPECT_TRUE(files == test::filesUnder(scratch / "16")) << format;
+    EXPECT_TRUE(files == test::filesUnder(scratch / "64")) << format;
+  }
+}
+
+TEST(SliceExport, NothingExistsBeforeFinishNorAfterAFailure) {
+  const test::ScratchFolder scratch;
+  {
+    Export unfinished({scratch / "out"});
+    const Job job = largeJob();
+    unfinished.sink().plan(job.schema);
+    for (const Slab& slab : test::cutIntoSlabs(job.grids, job.schema.lattice, 16))
+      unfinished.sink().write(slab);
+    EXPECT_FALSE(fs::exists(scratch / "out"));
+  }
+  EXPECT_TRUE(fs::is_empty(scratch.path()));
+}
+
+TEST(SliceExport, OverwritingReplacesAStackAndNothingElse) {
+  const test::ScratchFolder scratch;
+  Export({scratch / "out", "--prefix", "old"}).run(smallJob());
+  EXPECT_THAT([&] { Export({scratch / "out"}).run(smallJob()); },
+              ThrowsMessage<UsageError>("'" + (scratch / "out").string() +
+                                        "' exists; --overwrite replaces it"));
+  Export({scratch / "out", "--overwrite"}).run(smallJob());
+  EXPECT_FALSE(fs::exists(scratch / "out/old00000.png"));
+  EXPECT_TRUE(fs::exists(scratch / "out/slice_00000.png"));
+  fs::remove(scratch / "out/manifest.json");
+  EXPECT_THAT(
+      [&] {
+        Export({scratch / "out", "--overwrite"}).run(smallJob());
+      },
+      ThrowsMessage<UsageError>("'" + (scratch / "out").string() +
+                                "' holds no manifest.json, so it is no stack of slices to "
+                                "overwrite; name another folder"));
+}
+
+TEST(SliceExport, RefusesWhatItCannotSlice) {
+  const test::ScratchFolder scratch;
+  const auto planned = [&](const Job& job, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {scratch / "out"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return [job, arguments] { Export(arguments).sink().plan(job.schema); };
+  };
+  Job job = smallJob();
+  job.schema.grids.clear();
+  EXPECT_THAT(planned(job, {}),
+              ThrowsMessage<UsageError>("needs a grid 'material' or 'solid'; put dither, and "
+                                        "material-assign where there are materials, before it"));
+  job = smallJob();
+  job.schema.metadata.clear();
+  EXPECT_THAT(
+      planned(job, {}),
+      ThrowsMessage<DataError>("the grid 'material' comes without its table of materials; make "
+                               "it with material-assign"));
+  job = smallJob();
+  job.schema.grids["material"] = openvdb::FloatGrid::create();
+  EXPECT_THAT(planned(job, {}), ThrowsMessage<DataError>(HasSubstr("'material' is of type")));
+  job = smallJob();
+  job.schema.lattice.box = CoordBBox();
+  EXPECT_THAT(planned(job, {}),
+              ThrowsMessage<DataError>("there is nothing to slice: the lattice has no voxels"));
+  EXPECT_THAT(planned(smallJob(), {"--background", "26,26,29"}),
+              ThrowsMessage<UsageError>(
+                  "--background: the material 'black' has the colour 26,26,29; choose another"));
+  EXPECT_THAT(planned(smallJob(), {"--background", "grey"}),
+              ThrowsMessage<UsageError>(
+                  "--background: 'grey' is no colour; give #rrggbb or r,g,b of 0 to 255"));
+  EXPECT_THAT(planned(smallJob(), {"--prefix", "a/b"}),
+              ThrowsMessage<UsageError>("--prefix: 'a/b' must not hold a '/'"));
+}
+
+TEST(SliceExport, AnUnknownMaterialOrAMissingLayerIsAnError) {
+  const test::ScratchFolder scratch;
+  Job job = smallJob();
+  job.grids["material"] = drawnMaterial({{"7"}}, 4);
+  EXPECT_THAT(
+      [&] { Export({scratch / "out"}).run(job); },
+      ThrowsMessage<DataError>("layer 4 holds material 7, but the table of materials ends at 2"));
+  Export gap({scratch / "out"});
+  const Job large = largeJob();
+  gap.sink().plan(large.schema);
+  const std::vector<Slab> slabs = test::cutIntoSlabs(large.grids, large.schema.lattice, 8);
+  gap.sink().write(slabs[0]);
+  EXPECT_THAT([&] { gap.sink().write(slabs[2]); },
+              ThrowsMessage<DataError>("layers -8 to -1 are missing"));
+}
+
+}  // namespace
+}  // namespace vdbdither

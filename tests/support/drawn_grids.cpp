@@ -1,0 +1,45 @@
+#include "tests/support/drawn_grids.h"
+
+#include "vdbdither/layers.h"
+
+namespace vdbdither::test {
+
+openvdb::Int32Grid::Ptr drawnMaterial(const std::vector<std::vector<std::string>>& layers,
+                                      int first_layer) {
+  auto grid = openvdb::Int32Grid::create(0);
+  for (std::size_t z = 0; z < layers.size(); ++z) {
+    const auto rows = static_cast<int>(layers[z].size());
+    for (int row = 0; row < rows; ++row) {
+      const std::string& text = layers[z][row];
+      for (std::size_t x = 0; x < text.size(); ++x) {
+        if (text[x] < '1' || text[x] > '9') continue;
+        grid->tree().setValue(
+            openvdb::Coord(static_cast<int>(x), rows - 1 - row, first_layer + static_cast<int>(z)),
+            text[x] - '0');
+      }
+    }
+  }
+  return grid;
+}
+
+openvdb::BoolGrid::Ptr solidOf(const openvdb::Int32Grid& values) {
+  return openvdb::BoolGrid::create(
+      std::make_shared<openvdb::BoolTree>(values.tree(), false, true, openvdb::TopologyCopy()));
+}
+
+std::vector<Slab> cutIntoSlabs(const Grids& grids, const Lattice& lattice, int height) {
+  std::vector<Slab> slabs;
+  const ZRange layers = lattice.layers();
+  for (int z = alignedToLeaves(layers).begin; z < layers.end; z += height) {
+    const ZRange core = intersection({z, z + height}, layers);
+    Slab slab{core, core, {}};
+    for (const auto& [name, grid] : grids) {
+      const Layers piece{grid, layers};
+      slab.grids[name] = joinLayers({&piece, 1}, core);
+    }
+    slabs.push_back(slab);
+  }
+  return slabs;
+}
+
+}  // namespace vdbdither::test
