@@ -1,20 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "io/digest.h"
 #include "io/vdb.h"
-
-namespace openvdb {
-OPENVDB_USE_VERSION_NAMESPACE
-namespace OPENVDB_VERSION_NAME {
-namespace io {
-class Stream;
-}
-}  // namespace OPENVDB_VERSION_NAME
-}  // namespace openvdb
 
 namespace vdbdither {
 
@@ -23,17 +15,28 @@ namespace vdbdither {
 inline constexpr std::size_t uuid_offset = 21;
 inline constexpr std::size_t uuid_size = 36;
 
-/// What stands for the UUID while the digest is taken.
-inline constexpr std::string_view neutral_uuid = "00000000-0000-0000-0000-000000000000";
+/// What OpenVDB needs to see of an archive before it is read: the part up to the end of its UUID.
+inline constexpr std::size_t archive_head_size = uuid_offset + uuid_size;
 
-/// The digest in the form of a UUID of version 8 (RFC 9562: vendor-specific), which tells it from
-/// OpenVDB's random ones.
-std::string uuidOf(const Digest::Value& value);
+/// The UUID of an archive of ours. It has version 8 (RFC 9562: vendor-specific), which tells it
+/// from OpenVDB's random ones: 48 bits are the archive's length in bytes, 72 bits the beginning of
+/// the SHA-256 of all its other bytes.
+class ArchiveDigest {
+ public:
+  /// Takes the bytes of an archive as they come; whatever UUID they hold is left out.
+  void update(const char* bytes, std::size_t size);
 
-/// Whether a UUID has that form.
-bool isDigestUuid(std::string_view uuid);
+  [[nodiscard]] std::string uuid();
 
-/// What an archive that was read from a stream holds.
-VdbContents contentsOf(openvdb::io::Stream& archive);
+ private:
+  Digest digest_;
+  std::size_t size_ = 0;
+};
+
+/// The length that the UUID within an archive's head states; nothing where another tool wrote it.
+std::optional<std::size_t> statedLength(std::string_view head);
+
+/// Checks and reads an archive. `where` names its origin in errors. Throws DataError.
+VdbContents contentsOfBytes(std::string_view bytes, const std::string& where);
 
 }  // namespace vdbdither

@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <istream>
+#include <limits>
 #include <sstream>
 #include <unistd.h>
-#include <vector>
-
-#include <openvdb/io/Stream.h>
 
 #include "io/archive_digest.h"
 #include "vdbdither/errors.h"
@@ -52,76 +49,8 @@ void FrameWriter::send(const VdbContents& contents) {
   }
 }
 
-/// Reads a descriptor and digests what is consumed. OpenVDB leaves the position behind its archive,
-/// so the next one begins where it stopped; each is read through an istream of its own (a reused
-/// one fails on the second archive).
-class FrameReader::Buffer : public std::streambuf {
- public:
-  Buffer(int descriptor, const std::string& where)
-      : descriptor_(descriptor), where_(where), bytes_(1 << 20) {
-    setg(bytes_.data(), bytes_.data(), bytes_.data());
-  }
-
-  /// Makes the header of the next archive ready. False at the end of the pipe.
-  bool begin() {
-    digest_ = {};
-    // The unread rest moves to the front, so that the header lies in one piece.
-    const std::size_t rest = egptr() - gptr();
-    std::memmove(bytes_.data(), gptr(), rest);
-    setg(bytes_.data(), bytes_.data(), bytes_.data() + rest);
-    digested_ = gptr();
-    while (static_cast<std::size_t>(egptr() - gptr()) < uuid_offset + uuid_size) {
-      const std::size_t count = fill(egptr());
-      if (count == 0) break;
-      setg(eback(), gptr(), egptr() + count);
-    }
-    if (gptr() == egptr()) return false;
-    if (static_cast<std::size_t>(egptr() - gptr()) >= uuid_offset + uuid_size) {
-      uuid_.assign(gptr() + uuid_offset, uuid_size);
-      neutral_uuid.copy(gptr() + uuid_offset, uuid_size);
-    }
-    return true;
-  }
-
-  /// Whether what was consumed since `begin` is what its digest says; true where it carries none.
-  bool intact() {
-    digestConsumed();
-    return !isDigestUuid(uuid_) || uuid_ == uuidOf(digest_.finish());
-  }
-
- protected:
-  int_type underflow() override {
-    digestConsumed();
-    const std::size_t count = fill(bytes_.data());
-    setg(bytes_.data(), bytes_.data(), bytes_.data() + count);
-    digested_ = gptr();
-    return count ? traits_type::to_int_type(*gptr()) : traits_type::eof();
-  }
-
- private:
-  std::size_t fill(char* target) {
-    for (;;) {
-      const ssize_t count = ::read(descriptor_, target, bytes_.data() + bytes_.size() - target);
-      if (count >= 0) return static_cast<std::size_t>(count);
-      if (errno != EINTR) throw DataError("cannot read " + where_ + ": " + std::strerror(errno));
-    }
-  }
-
-  void digestConsumed() {
-    digest_.update(digested_, gptr() - digested_);
-    digested_ = gptr();
-  }
-
-  int descriptor_;
-  std::string where_;
-  std::vector<char> bytes_;
-  char* digested_ = nullptr;
-  Digest digest_;
-  std::string uuid_;
-};
-
 FrameReader::FrameReader(int descriptor, std::string where)
-    : buffer_(std::make_unique<Buffer>(descriptor, where)), where_(std::move(where)) {
+    : descriptor_(descriptor), where_(std::move(where)) {
   VdbContents contents = receive();
   const auto frame = contents.metadata.extract(frame_key);
   framed_ = !frame.empty();
@@ -131,26 +60,33 @@ FrameReader::FrameReader(int descriptor, std::string where)
   if (!framed_) foreign_ = Slab{schema_.lattice.layers(), schema_.lattice.layers(), contents.grids};
 }
 
-FrameReader::~FrameReader() = default;
+std::string FrameReader::take(std::size_t size) {
+  constexpr std::size_t chunk = 1 << 20;
+  std::string bytes;
+  // Room grows with what comes: a damaged length must not ask for all of memory.
+  while (bytes.size() < size) {
+    const std::size_t begin = bytes.size();
+    bytes.resize(begin + std::min(chunk, size - begin));
+    const ssize_t count = ::read(descriptor_, bytes.data() + begin, bytes.size() - begin);
+    if (count < 0 && errno != EINTR)
+      throw DataError("cannot read " + where_ + ": " + std::strerror(errno));
+    bytes.resize(begin + std::max<ssize_t>(count, 0));
+    if (count == 0) break;
+  }
+  return bytes;
+}
 
 VdbContents FrameReader::receive() {
-  if (!buffer_->begin()) {
+  std::string bytes = take(archive_head_size);
+  if (bytes.empty()) {
     throw DataError(
         framed_ ? where_ + " ended before its closing frame: the run upstream failed or was stopped"
                 : where_ + " is empty: the run upstream failed, or nothing was piped in");
   }
-  VdbContents contents;
-  try {
-    std::istream stream(buffer_.get());
-    stream.exceptions(std::ios::badbit);
-    openvdb::io::Stream archive(stream, false);
-    contents = contentsOf(archive);
-  } catch (const openvdb::Exception& error) {
-    throw DataError(where_ + " is not a readable VDB stream: " + error.what());
-  }
-  if (!buffer_->intact())
-    throw DataError(where_ + " is damaged: the checksum of a frame does not match");
-  return contents;
+  // Archives of other tools do not say how long they are: such a pipe holds one.
+  const std::size_t length = statedLength(bytes).value_or(std::numeric_limits<std::size_t>::max());
+  if (length > bytes.size()) bytes += take(length - bytes.size());
+  return contentsOfBytes(bytes, where_);
 }
 
 std::optional<Slab> FrameReader::next() {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <memory>
 #include <optional>
 
 #include "io/vdb.h"
@@ -34,7 +33,6 @@ class FrameReader {
  public:
   /// `where` names the pipe in messages. Throws DataError for anything that is no VDB stream.
   FrameReader(int descriptor, std::string where);
-  ~FrameReader();
 
   [[nodiscard]] const Schema& schema() const { return schema_; }
 
@@ -43,11 +41,10 @@ class FrameReader {
   std::optional<Slab> next();
 
  private:
-  class Buffer;
-
+  std::string take(std::size_t size);
   VdbContents receive();
 
-  std::unique_ptr<Buffer> buffer_;
+  int descriptor_;
   std::string where_;
   Schema schema_;
   std::optional<Slab> foreign_;

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
-#include <span>
 #include <sstream>
 
 #include <openvdb/io/File.h>
@@ -63,24 +64,6 @@ class StreamArchive : public openvdb::io::Archive {
   openvdb::MetaMap metadata_;
 };
 
-/// Reads `stream` to its end. Returns the digest of all but the UUID, as a UUID, and the UUID that
-/// is there.
-std::pair<std::string, std::string> digestAndUuid(std::istream& stream) {
-  Digest digest;
-  std::string uuid;
-  std::vector<char> buffer(1 << 20);
-  while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())),
-         stream.gcount() > 0) {
-    const auto size = static_cast<std::size_t>(stream.gcount());
-    if (uuid.empty() && size >= uuid_offset + uuid_size) {
-      uuid.assign(buffer.data() + uuid_offset, uuid_size);
-      neutral_uuid.copy(buffer.data() + uuid_offset, uuid_size);
-    }
-    digest.update(buffer.data(), size);
-  }
-  return {uuidOf(digest.finish()), uuid};
-}
-
 std::string quoted(const std::filesystem::path& path) { return "'" + path.string() + "'"; }
 
 /// Statistics that OpenVDB writes into a grid's metadata are of the file, not of the grid.
@@ -106,20 +89,62 @@ VdbContents collected(const openvdb::GridPtrVec& grids, const openvdb::MetaMap& 
   return contents;
 }
 
-/// Opens and reads with `read`, its failures told as DataError.
-template <typename ReadFile>
-VdbContents readFile(const std::filesystem::path& path, const ReadFile& read) {
+/// Bytes that are there already, as a stream.
+class MemoryBuffer : public std::streambuf {
+ public:
+  explicit MemoryBuffer(std::string_view bytes) {
+    char* begin = const_cast<char*>(bytes.data());
+    setg(begin, begin, begin + bytes.size());
+  }
+};
+
+/// OpenVDB's Stream, not its File: without delayed loading it meets every truncation with an
+/// exception.
+VdbContents readStream(std::istream& stream, const std::string& where) {
+  try {
+    openvdb::io::Stream archive(stream, false);
+    const openvdb::GridPtrVecPtr grids = archive.getGrids();
+    for (const GridBase::Ptr& grid : *grids) dropFileStatistics(*grid);
+    return collected(*grids, *archive.getMetadata());
+  } catch (const openvdb::Exception& error) {
+    throw DataError(where + " is not a readable VDB archive: " + error.what());
+  }
+}
+
+std::ifstream openArchive(const std::filesystem::path& path) {
   std::error_code none;
   if (!std::filesystem::exists(path, none)) throw DataError("no such file " + quoted(path));
   if (!std::filesystem::is_regular_file(path, none))
     throw DataError(quoted(path) + " is not a file");
-  try {
-    openvdb::io::File file(path.string());
-    file.open(false);
-    return read(file);
-  } catch (const openvdb::Exception& error) {
-    throw DataError(quoted(path) + " is not a readable VDB file: " + error.what());
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw DataError("cannot read " + quoted(path) + ": " + std::strerror(errno));
+  std::string head(archive_head_size, 0);
+  if (!file.read(head.data(), static_cast<std::streamsize>(head.size()))) {
+    throw DataError(quoted(path) + " is not a readable VDB archive: it is too short");
   }
+  file.clear();
+  file.seekg(0);
+  if (const auto length = statedLength(head);
+      length && *length != std::filesystem::file_size(path, none)) {
+    throw DataError(quoted(path) + " is cut short: it was written with " + std::to_string(*length) +
+                    " bytes");
+  }
+  return file;
+}
+
+/// The UUID that the archive in `file` should have and the one it has.
+std::pair<std::string, std::string> uuidsOf(std::istream& file) {
+  ArchiveDigest digest;
+  std::string head;
+  std::vector<char> buffer(1 << 20);
+  while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())), file.gcount() > 0) {
+    if (head.empty())
+      head.assign(buffer.data(), std::min<std::size_t>(file.gcount(), archive_head_size));
+    digest.update(buffer.data(), static_cast<std::size_t>(file.gcount()));
+  }
+  file.clear();
+  file.seekg(0);
+  return {digest.uuid(), statedLength(head) ? head.substr(uuid_offset) : ""};
 }
 
 std::string boxText(const CoordBBox& box) {
@@ -161,22 +186,48 @@ Lattice latticeOf(const GridBase& grid, const std::string& where) {
 
 }  // namespace
 
-std::string uuidOf(const Digest::Value& value) {
-  std::string hex = hexText(value).substr(0, 32);
-  hex[12] = '8';
-  hex[16] = 'a';
-  return hex.substr(0, 8) + "-" + hex.substr(8, 4) + "-" + hex.substr(12, 4) + "-" +
-         hex.substr(16, 4) + "-" + hex.substr(20);
+void ArchiveDigest::update(const char* bytes, std::size_t size) {
+  const std::size_t uuid_begin = std::clamp(uuid_offset, size_, size_ + size) - size_;
+  const std::size_t uuid_end = std::clamp(archive_head_size, size_, size_ + size) - size_;
+  digest_.update(bytes, uuid_begin);
+  digest_.update(bytes + uuid_end, size - uuid_end);
+  size_ += size;
 }
 
-bool isDigestUuid(std::string_view uuid) {
-  return uuid.size() == uuid_size && uuid[14] == '8' && uuid[19] == 'a';
+std::string ArchiveDigest::uuid() {
+  const std::string digest = hexText(digest_.finish());
+  std::array<char, 17> length{};
+  std::snprintf(length.data(), length.size(), "%012zx", size_);
+  const std::string size = length.data();
+  return size.substr(0, 8) + "-" + size.substr(8, 4) + "-8" + digest.substr(0, 3) + "-a" +
+         digest.substr(3, 3) + "-" + digest.substr(6, 12);
 }
 
-VdbContents contentsOf(openvdb::io::Stream& archive) {
-  const openvdb::GridPtrVecPtr grids = archive.getGrids();
-  for (const GridBase::Ptr& grid : *grids) dropFileStatistics(*grid);
-  return collected(*grids, *archive.getMetadata());
+std::optional<std::size_t> statedLength(std::string_view head) {
+  if (head.size() < archive_head_size) return std::nullopt;
+  const std::string_view uuid = head.substr(uuid_offset, uuid_size);
+  if (uuid[14] != '8' || uuid[19] != 'a') return std::nullopt;
+  const std::string digits = std::string(uuid.substr(0, 8)) + std::string(uuid.substr(9, 4));
+  std::size_t length = 0;
+  const auto [end, error] =
+      std::from_chars(digits.data(), digits.data() + digits.size(), length, 16);
+  if (error != std::errc() || end != digits.data() + digits.size()) return std::nullopt;
+  return length;
+}
+
+VdbContents contentsOfBytes(std::string_view bytes, const std::string& where) {
+  if (const auto length = statedLength(bytes)) {
+    ArchiveDigest digest;
+    digest.update(bytes.data(), bytes.size());
+    if (*length != bytes.size() || digest.uuid() != bytes.substr(uuid_offset, uuid_size)) {
+      throw DataError(where + " is damaged: its checksum does not match");
+    }
+  }
+  if (bytes.size() < archive_head_size)
+    throw DataError(where + " is not a readable VDB archive: it is too short");
+  MemoryBuffer buffer(bytes);
+  std::istream stream(&buffer);
+  return readStream(stream, where);
 }
 
 void initializeVdb() { openvdb::initialize(); }
@@ -185,11 +236,9 @@ std::string archiveBytes(const VdbContents& contents, VdbCodec codec) {
   std::ostringstream stream(std::ios::binary);
   StreamArchive(contents, codec).writeTo(stream, false);
   std::string bytes = std::move(stream).str();
-  neutral_uuid.copy(bytes.data() + uuid_offset, uuid_size);
-  Digest digest;
+  ArchiveDigest digest;
   digest.update(bytes.data(), bytes.size());
-  const std::string uuid = uuidOf(digest.finish());
-  std::copy(uuid.begin(), uuid.end(), bytes.begin() + uuid_offset);
+  digest.uuid().copy(bytes.data() + uuid_offset, uuid_size);
   return bytes;
 }
 
@@ -207,8 +256,7 @@ void writeVdb(const std::filesystem::path& path, const VdbContents& contents, Vd
     file.flush();
     file.exceptions(std::ios::badbit);
     file.seekg(0);
-    const std::string uuid = digestAndUuid(file).first;
-    file.clear();
+    const std::string uuid = uuidsOf(file).first;
     file.exceptions(std::ios::badbit | std::ios::failbit);
     file.seekp(uuid_offset);
     file.write(uuid.data(), uuid_size);
@@ -219,24 +267,25 @@ void writeVdb(const std::filesystem::path& path, const VdbContents& contents, Vd
 }
 
 VdbContents readVdb(const std::filesystem::path& path) {
-  VdbContents contents = readFile(path, [](openvdb::io::File& file) {
-    const openvdb::GridPtrVecPtr grids = file.getGrids();
-    for (const GridBase::Ptr& grid : *grids) dropFileStatistics(*grid);
-    return collected(*grids, *file.getMetadata());
-  });
-  std::ifstream file(path, std::ios::binary);
-  const auto [digest, uuid] = digestAndUuid(file);
-  if (isDigestUuid(uuid) && uuid != digest) {
+  std::ifstream file = openArchive(path);
+  // Before OpenVDB sees it, which takes damaged bytes as they are.
+  const auto [computed, stated] = uuidsOf(file);
+  if (!stated.empty() && stated != computed) {
     throw DataError(quoted(path) + " is damaged: its checksum does not match; make it again");
   }
-  return contents;
+  return readStream(file, quoted(path));
 }
 
 VdbContents readVdbHead(const std::filesystem::path& path) {
-  return readFile(path, [](openvdb::io::File& file) {
+  openArchive(path);
+  try {
+    openvdb::io::File file(path.string());
+    file.open(false);
     const openvdb::GridPtrVecPtr grids = file.readAllGridMetadata();
     return collected(*grids, *file.getMetadata());
-  });
+  } catch (const openvdb::Exception& error) {
+    throw DataError(quoted(path) + " is not a readable VDB archive: " + error.what());
+  }
 }
 
 GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name) {

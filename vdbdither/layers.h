@@ -14,7 +14,8 @@ struct Layers {
 };
 
 /// One grid of the layers of all `pieces` within `wanted`, and background elsewhere. The pieces
-/// agree in type, background, transform and metadata, and their ranges do not overlap. A piece that
+/// agree in type, background, transform and metadata, and their
+/// ranges meet at multiples of eight. A piece that
 /// is all of the result comes back itself; otherwise nodes are copied. Throws DataError for a grid
 /// type that slabs cannot carry (points, strings).
 GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted);

@@ -92,7 +92,6 @@ void addTo(CLI::App& app, const Option& option, const std::string& group) {
   }
   added->group(group)->option_text(option.value +
                                    (option.fallback.empty() ? "" : " [" + option.fallback + "]"));
-  added->required(option.required);
   if (option.kind == Option::Kind::value)
     added->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
 }
@@ -275,13 +274,17 @@ void Options::parse(std::span<const std::string> arguments, const Options& commo
   }
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
-  } catch (const CLI::RequiredError& error) {
-    throw UsageError(std::string(error.what()) + "; see --help");
   } catch (const CLI::ParseError& error) {
     throw UsageError(error.what());
   }
   const std::vector<std::string> extras = app.remaining();
-  if (extras.empty()) return;
+  if (extras.empty()) {
+    for (const Option& option : options_) {
+      if (option.required && option.get().empty())
+        throw UsageError(option.name + " is missing; see --help");
+    }
+    return;
+  }
   const std::string& extra = extras.front();
   if (!extra.starts_with('-')) throw UsageError("unexpected argument '" + extra + "'; see --help");
   const std::string option_name = extra.substr(0, extra.find('='));

@@ -22,7 +22,8 @@ std::string refusal(const Words& words) {
 }
 
 TEST(Chain, ExclamationMarksPartTheSteps) {
-  const std::vector<Step> steps = parseChain(Words{"mesh2sdf", "a.stl", "!", "dither", "!", "write", "-"});
+  const std::vector<Step> steps =
+      parseChain(Words{"mesh2sdf", "a.stl", "!", "dither", "!", "write", "-"});
   ASSERT_EQ(steps.size(), 3U);
   EXPECT_EQ(steps[0].verb, "mesh2sdf");
   EXPECT_THAT(steps[0].arguments, ElementsAre("a.stl"));
@@ -39,7 +40,8 @@ TEST(Chain, EmptyStepsAreRefused) {
 
 TEST(Chain, WordsAreCutAsAShellWould) {
   EXPECT_THAT(splitWords(R"(mesh2sdf 'my part.stl'|dither --mask "a \"b\".vdb" | write x\ y.vdb)"),
-              ElementsAre("mesh2sdf", "my part.stl", "|", "dither", "--mask", R"(a "b".vdb)", "|", "write", "x y.vdb"));
+              ElementsAre("mesh2sdf", "my part.stl", "|", "dither", "--mask", R"(a "b".vdb)", "|",
+                          "write", "x y.vdb"));
   EXPECT_THAT(splitWords("  "), IsEmpty());
   EXPECT_THAT(splitWords("a '' b"), ElementsAre("a", "", "b"));
   EXPECT_THROW(splitWords("mesh2sdf 'part.stl"), UsageError);

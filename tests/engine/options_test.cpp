@@ -44,8 +44,8 @@ struct Example {
 
 TEST(Options, ReadsEveryKindOfValue) {
   Example example;
-  example.options.parse(Words{"part.stl", "--strict", "--count", "5", "--amplitude=2.5", "--band", "42um", "--mask",
-                              "white", "--rotate", "-90,0,4.5"});
+  example.options.parse(Words{"part.stl", "--strict", "--count", "5", "--amplitude=2.5", "--band",
+                              "42um", "--mask", "white", "--rotate", "-90,0,4.5"});
   EXPECT_EQ(example.file, "part.stl");
   EXPECT_TRUE(example.strict);
   EXPECT_EQ(example.count, 5);
@@ -58,29 +58,35 @@ TEST(Options, ReadsEveryKindOfValue) {
 TEST(Options, CanonicalTextLeavesDefaultsOutAndReadsBack) {
   Example example;
   EXPECT_EQ(example.options.canonical(), "");
-  example.options.parse(Words{"--rotate", "30", "my part.stl", "--band=0.1", "--strict", "--count", "3"});
+  example.options.parse(
+      Words{"--rotate", "30", "my part.stl", "--band=0.1", "--strict", "--count", "3"});
   EXPECT_EQ(example.options.canonical(), "'my part.stl' --strict --band 0.1mm --rotate 30,30,30");
 }
 
 TEST(Options, RefusalsSayWhatWouldHaveBeenAccepted) {
   const Example example;
-  EXPECT_EQ(refusal(example.options, {"a", "--count", "12"}), "--count: '12' is not a whole number between 1 and 9");
-  EXPECT_EQ(refusal(example.options, {"a", "--count", "2.5"}), "--count: '2.5' is not a whole number between 1 and 9");
-  EXPECT_EQ(refusal(example.options, {"a", "--amplitude", "9"}), "--amplitude: '9' is not a number between 0 and 8");
+  EXPECT_EQ(refusal(example.options, {"a", "--count", "12"}),
+            "--count: '12' is not a whole number between 1 and 9");
+  EXPECT_EQ(refusal(example.options, {"a", "--count", "2.5"}),
+            "--count: '2.5' is not a whole number between 1 and 9");
+  EXPECT_EQ(refusal(example.options, {"a", "--amplitude", "9"}),
+            "--amplitude: '9' is not a number between 0 and 8");
   EXPECT_EQ(refusal(example.options, {"a", "--amplitude", "nan"}),
             "--amplitude: 'nan' is not a number between 0 and 8");
-  EXPECT_EQ(refusal(example.options, {"a", "--mask", "pink"}), "--mask: 'pink' is none of blue, white");
+  EXPECT_EQ(refusal(example.options, {"a", "--mask", "pink"}),
+            "--mask: 'pink' is none of blue, white");
   EXPECT_EQ(refusal(example.options, {"a", "--band", "2 parsec"}),
             "--band: '2 parsec' is not a length such as 0.042mm, 42um or 600dpi");
   EXPECT_EQ(refusal(example.options, {"a", "--rotate", "1,2"}),
             "--rotate: '1,2' is not three numbers such as 0,45,90, or one for all three");
   EXPECT_EQ(refusal(example.options, {"a", "b"}), "unexpected argument 'b'; see --help");
-  EXPECT_EQ(refusal(example.options, {}), "file is required; see --help");
+  EXPECT_EQ(refusal(example.options, {}), "file is missing; see --help");
 }
 
 TEST(Options, UnknownOptionNamesTheNearest) {
   const Example example;
-  EXPECT_EQ(refusal(example.options, {"a", "--amplitud", "2"}), "no option '--amplitud'; did you mean '--amplitude'?");
+  EXPECT_EQ(refusal(example.options, {"a", "--amplitud", "2"}),
+            "no option '--amplitud'; did you mean '--amplitude'?");
   EXPECT_EQ(refusal(example.options, {"a", "--zzzzzzzz"}), "no option '--zzzzzzzz'; see --help");
 }
 
@@ -114,8 +120,8 @@ TEST(Options, LengthsHaveUnits) {
 TEST(Options, HelpShowsEveryOptionWithItsDefault) {
   const Example example;
   const std::string help = example.options.help("example", "does things", "example part.stl", {});
-  for (const char* part : {"does things", "--amplitude X [4]", "--mask blue|white [blue]", "--strict", "--band LENGTH",
-                           "vdbdither example part.stl"}) {
+  for (const char* part : {"does things", "--amplitude X [4]", "--mask blue|white [blue]",
+                           "--strict", "--band LENGTH", "vdbdither example part.stl"}) {
     EXPECT_NE(help.find(part), std::string::npos) << part << "\n" << help;
   }
 }

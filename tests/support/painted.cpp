@@ -33,7 +33,8 @@ std::vector<std::string> picture(const openvdb::BoolGrid& grid, const openvdb::C
   for (int z = box.min().z(); z <= box.max().z(); ++z) {
     std::string& layer = layers.emplace_back();
     for (int y = box.max().y(); y >= box.min().y(); --y) {
-      for (int x = box.min().x(); x <= box.max().x(); ++x) layer += accessor.getValue({x, y, z}) ? '#' : '.';
+      for (int x = box.min().x(); x <= box.max().x(); ++x)
+        layer += accessor.getValue({x, y, z}) ? '#' : '.';
       layer += '\n';
     }
   }

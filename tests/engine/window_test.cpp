@@ -1,0 +1,95 @@
+#include "vdbdither/window.h"
+
+#include <gtest/gtest.h>
+
+#include "vdbdither/openvdb.h"
+
+namespace vdbdither {
+namespace {
+
+using openvdb::Int32Grid;
+
+constexpr ZRange job{-13, 52};
+
+/// A slab whose voxel (0, 0, z) holds z + 100, in a grid `a` and a grid `b`.
+Slab numbered(ZRange core) {
+  Slab slab{core, core, {}};
+  for (const char* name : {"a", "b"}) {
+    const auto grid = Int32Grid::create(0);
+    for (int z = core.begin; z < core.end; ++z) grid->tree().setValue({0, 0, z}, z + 100);
+    slab.grids[name] = grid;
+  }
+  return slab;
+}
+
+std::vector<Window::Task> pushAll(Window& window, int height) {
+  std::vector<Window::Task> tasks;
+  for (int begin = job.begin; begin < job.end;) {
+    const int end = std::min(alignedToLeaves({begin, begin + 1}).begin + height, job.end);
+    for (Window::Task& task : window.push(numbered({begin, end}))) tasks.push_back(std::move(task));
+    begin = end;
+  }
+  return tasks;
+}
+
+int valueAt(const Grids& grids, const char* name, int z) {
+  return openvdb::gridConstPtrCast<Int32Grid>(grids.at(name))->tree().getValue({0, 0, z});
+}
+
+TEST(Window, EveryCoreComesOnceInRisingOrderWithItsWholeHalo) {
+  for (const int height : {8, 16, 64}) {
+    for (const int radius : {0, 1, 9, 30}) {
+      Window window({{"a", {radius, radius + 2}}}, job, job);
+      int next = job.begin;
+      for (const Window::Task& task : pushAll(window, height)) {
+        EXPECT_EQ(task.input.core.begin, next);
+        next = task.input.core.end;
+        EXPECT_EQ(task.input.valid,
+                  intersection({task.input.core.begin - radius, next + radius + 2}, job));
+        for (int z = task.input.valid.begin; z < task.input.valid.end; ++z) {
+          EXPECT_EQ(valueAt(task.input.grids, "a", z), z + 100);
+        }
+      }
+      EXPECT_EQ(next, job.end) << height << " " << radius;
+    }
+  }
+}
+
+TEST(Window, TheFilterGetsOnlyWhatItReadsAndTheRestPasses) {
+  Window window({{"a", Reach::stencil(1)}}, job, job);
+  for (const Window::Task& task : pushAll(window, 8)) {
+    EXPECT_FALSE(task.input.grids.contains("b"));
+    EXPECT_EQ(valueAt(task.passing.grids, "b", task.passing.core.begin),
+              task.passing.core.begin + 100);
+    EXPECT_EQ(valueAt(task.passing.grids, "a", task.passing.core.end), 0);
+  }
+}
+
+TEST(Window, HandsOutOnlyTheCoresAskedFor) {
+  Window window({{"a", Reach::stencil(3)}}, job, {0, 16});
+  const std::vector<Window::Task> tasks = pushAll(window, 8);
+  ASSERT_EQ(tasks.size(), 2U);
+  EXPECT_EQ(tasks[0].input.core, (ZRange{0, 8}));
+  EXPECT_EQ(tasks[1].input.core, (ZRange{8, 16}));
+  EXPECT_EQ(valueAt(tasks[1].input.grids, "a", 18), 118);
+}
+
+TEST(Window, ABarrierGetsAllLayersAtOnce) {
+  Window window({{"a", Reach::everything()}}, job, job);
+  const std::vector<Window::Task> tasks = pushAll(window, 8);
+  ASSERT_EQ(tasks.size(), 1U);
+  EXPECT_EQ(tasks[0].input.core, job);
+  EXPECT_EQ(valueAt(tasks[0].input.grids, "a", -13), 87);
+  EXPECT_EQ(valueAt(tasks[0].input.grids, "a", 51), 151);
+}
+
+TEST(Window, AGridThatIsReadAtItsPointIsNotCopied) {
+  Window window({{"a", Reach::point()}}, job, job);
+  const Slab slab = numbered({-13, -8});
+  const std::vector<Window::Task> tasks = window.push(slab);
+  ASSERT_EQ(tasks.size(), 1U);
+  EXPECT_EQ(tasks[0].input.grids.at("a"), slab.grids.at("a"));
+}
+
+}  // namespace
+}  // namespace vdbdither

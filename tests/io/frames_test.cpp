@@ -1,0 +1,163 @@
+#include "io/frames.h"
+
+#include <csignal>
+#include <random>
+#include <sys/mman.h>
+#include <thread>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+
+#include "vdbdither/errors.h"
+#include "vdbdither/openvdb.h"
+
+namespace vdbdither {
+namespace {
+
+Schema schemaOfSample() {
+  Schema schema;
+  schema.lattice.pitch_mm = {0.042, 0.084, 0.022};
+  schema.lattice.box = openvdb::CoordBBox({0, 0, -8}, {30, 30, 23});
+  const auto surface = openvdb::FloatGrid::create(0.5F);
+  surface->setTransform(openvdb::math::Transform::createLinearTransform(1));
+  surface->transform().preScale(schema.lattice.pitch_mm);
+  schema.grids["surface"] = surface;
+  schema.metadata["vdbdither:history"] = "mesh2sdf part.stl";
+  return schema;
+}
+
+Slab slabOf(const Schema& schema, ZRange core) {
+  const auto grid =
+      openvdb::gridPtrCast<openvdb::FloatGrid>(schema.grids.at("surface")->deepCopyGrid());
+  for (int z = core.begin; z < core.end; ++z)
+    grid->tree().setValue({z & 7, 3, z}, 0.01F * static_cast<float>(z));
+  return {core, core, {{"surface", grid}}};
+}
+
+/// What a writer puts on a pipe for slabs of eight layers.
+std::string recorded() {
+  const Schema schema = schemaOfSample();
+  const int file = ::memfd_create("frames", 0);
+  FrameWriter writer(file);
+  writer.head(schema);
+  for (int z = -8; z < 24; z += 8) writer.slab(slabOf(schema, {z, z + 8}));
+  writer.end();
+  std::string bytes(::lseek(file, 0, SEEK_END), 0);
+  EXPECT_EQ(::pread(file, bytes.data(), bytes.size(), 0), static_cast<ssize_t>(bytes.size()));
+  ::close(file);
+  return bytes;
+}
+
+/// Reads all frames of `bytes`; returns what it is refused with, or the number of slabs.
+std::string outcome(const std::string& bytes) {
+  const int file = ::memfd_create("frames", 0);
+  EXPECT_EQ(::write(file, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
+  ::lseek(file, 0, SEEK_SET);
+  std::string result;
+  try {
+    FrameReader reader(file, "the pipe");
+    int slabs = 0;
+    while (reader.next()) ++slabs;
+    result = std::to_string(slabs);
+  } catch (const DataError& error) {
+    result = error.what();
+  }
+  ::close(file);
+  return result;
+}
+
+class Frames : public testing::Test {
+ protected:
+  void SetUp() override { initializeVdb(); }
+};
+
+TEST_F(Frames, SlabsArriveAsTheyWereSent) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  const Schema schema = schemaOfSample();
+  std::thread upstream([&] {
+    FrameWriter writer(ends[1]);
+    writer.head(schema);
+    for (int z = -8; z < 24; z += 8) writer.slab(slabOf(schema, {z, z + 8}));
+    writer.end();
+    ::close(ends[1]);
+  });
+  FrameReader reader(ends[0], "the pipe");
+  EXPECT_EQ(reader.schema().lattice, schema.lattice);
+  EXPECT_EQ(reader.schema().metadata, schema.metadata);
+  for (int z = -8; z < 24; z += 8) {
+    const std::optional<Slab> slab = reader.next();
+    ASSERT_TRUE(slab);
+    EXPECT_EQ(slab->core, (ZRange{z, z + 8}));
+    EXPECT_EQ(archiveBytes({slab->grids, {}}, VdbCodec::none),
+              archiveBytes({slabOf(schema, {z, z + 8}).grids, {}}, VdbCodec::none));
+  }
+  EXPECT_FALSE(reader.next());
+  upstream.join();
+  ::close(ends[0]);
+}
+
+TEST_F(Frames, EveryTruncationIsAnError) {
+  const std::string bytes = recorded();
+  ASSERT_EQ(outcome(bytes), "4");
+  for (std::size_t size = 0; size < bytes.size(); size += 1 + size / 40) {
+    EXPECT_NE(outcome(bytes.substr(0, size)).size(), 1U) << size;
+  }
+  EXPECT_EQ(outcome(""), "the pipe is empty: the run upstream failed, or nothing was piped in");
+}
+
+TEST_F(Frames, AMissingSlabIsAnError) {
+  const std::string bytes = recorded();
+  const std::size_t second = bytes.find(" BDV", 4);
+  const std::size_t third = bytes.find(" BDV", second + 4);
+  ASSERT_NE(third, std::string::npos);
+  EXPECT_EQ(outcome(bytes.substr(0, second) + bytes.substr(third)),
+            "the pipe has a frame out of place: 'end 32'");
+  EXPECT_EQ(outcome(bytes.substr(second)), "the pipe does not begin with a head frame");
+  EXPECT_EQ(outcome(bytes.substr(0, third)),
+            "the pipe ended before its closing frame: the run upstream failed or was stopped");
+}
+
+TEST_F(Frames, AFlippedByteIsFound) {
+  const std::string bytes = recorded();
+  std::mt19937 random(5);
+  for (int i = 0; i < 300; ++i) {
+    std::string damaged = bytes;
+    const std::size_t at = std::uniform_int_distribution<std::size_t>(60, bytes.size() - 1)(random);
+    damaged[at] = static_cast<char>(damaged[at] ^ (1 << (i % 8)));
+    // The one digit that marks a UUID as a digest, and the bytes that nobody reads, may change
+    // unseen.
+    if (outcome(damaged) == "4") {
+      const std::size_t frame = damaged.rfind(" BDV", at);
+      EXPECT_TRUE(at - frame == 21 + 14 || at - frame == 21 + 19) << at - frame;
+    }
+  }
+}
+
+TEST_F(Frames, AnArchiveOfAnotherToolIsOneSlab) {
+  const Schema schema = schemaOfSample();
+  EXPECT_EQ(outcome(archiveBytes({slabOf(schema, {0, 8}).grids, {}}, VdbCodec::none)), "1");
+}
+
+TEST_F(Frames, TextIsNoStream) {
+  EXPECT_NE(outcome(std::string(500, 'x')).find("the pipe is not a readable VDB archive"),
+            std::string::npos);
+}
+
+TEST_F(Frames, AReaderThatWentAwayIsAnError) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  ::close(ends[0]);
+  const auto old = ::signal(SIGPIPE, SIG_IGN);
+  try {
+    FrameWriter(ends[1]).head(schemaOfSample());
+    ADD_FAILURE();
+  } catch (const DataError& error) {
+    EXPECT_STREQ(error.what(), "the reader of the pipe has gone");
+  }
+  ::signal(SIGPIPE, old);
+  ::close(ends[1]);
+}
+
+}  // namespace
+}  // namespace vdbdither
