@@ -105,18 +105,18 @@ class TextCursor {
     const bool negative = at != end_ && *at == '-';
     at += negative;
     std::uint64_t digits = 0;
-    const auto readDigits = [&](std::uint64_t& value) {
+    const auto read_digits = [&](std::uint64_t& value) {
       const char* begin = at;
       for (; at != end_ && *at >= '0' && *at <= '9'; ++at) {
         value = value * 10 + static_cast<std::uint64_t>(*at - '0');
       }
       return at - begin;
     };
-    auto digit_count = readDigits(digits);
+    auto digit_count = read_digits(digits);
     std::ptrdiff_t exponent = 0;
     if (at != end_ && *at == '.') {
       ++at;
-      exponent = -readDigits(digits);
+      exponent = -read_digits(digits);
       digit_count -= exponent;
     }
     if (digit_count == 0 || digit_count > 15) return std::nullopt;
@@ -125,7 +125,7 @@ class TextCursor {
       const bool small = at != end_ && *at == '-';
       at += small || (at != end_ && *at == '+');
       std::uint64_t power = 0;
-      const auto power_digits = readDigits(power);
+      const auto power_digits = read_digits(power);
       if (power_digits == 0 || power_digits > 3) return std::nullopt;
       exponent += small ? -static_cast<std::ptrdiff_t>(power) : static_cast<std::ptrdiff_t>(power);
     }
