@@ -207,8 +207,8 @@ class Body {
     if (!(count >= 0) || count != std::floor(count)) {
       refuse("the list " + inQuotes(list.name) + " has a length that is no count");
     }
-    const std::size_t item = encoding_ == Encoding::kAscii ? 1 : sizeOf(list.type);
-    if (count > static_cast<double>(left() / item)) refuseCutOff();
+    const std::uint64_t held = left() / (encoding_ == Encoding::kAscii ? 1 : sizeOf(list.type));
+    if (count > static_cast<double>(held)) refuseCutOff();
     return static_cast<std::uint64_t>(count);
   }
 

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
 #include <charconv>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string_view>
@@ -61,6 +64,7 @@ class TextCursor {
   /// before it.
   std::optional<double> number() {
     skipBlanks();
+    if (const auto value = shortNumber()) return value;
     const char* begin = at_;
     if (end_ - begin > 1 && begin[0] == '+' && begin[1] != '-') ++begin;
     double value = 0;
@@ -91,6 +95,49 @@ class TextCursor {
     } else if (at_ != end_) {
       ++at_;
     }
+  }
+
+  /// `number` for the usual case, several times as fast: up to 15 digits and a power of ten up to
+  /// 22 are both exact in double, so that one multiplication or division rounds as it must (W. D.
+  /// Clinger, "How to Read Floating Point Numbers Accurately", 1990).
+  std::optional<double> shortNumber() {
+    const char* at = at_;
+    const bool negative = at != end_ && *at == '-';
+    at += negative;
+    std::uint64_t digits = 0;
+    const auto read_digits = [&](std::uint64_t& value) {
+      const char* begin = at;
+      for (; at != end_ && *at >= '0' && *at <= '9'; ++at) {
+        value = value * 10 + static_cast<std::uint64_t>(*at - '0');
+      }
+      return at - begin;
+    };
+    auto digit_count = read_digits(digits);
+    std::ptrdiff_t exponent = 0;
+    if (at != end_ && *at == '.') {
+      ++at;
+      exponent = -read_digits(digits);
+      digit_count -= exponent;
+    }
+    if (digit_count == 0 || digit_count > 15) return std::nullopt;
+    if (at != end_ && (*at == 'e' || *at == 'E')) {
+      ++at;
+      const bool small = at != end_ && *at == '-';
+      at += small || (at != end_ && *at == '+');
+      std::uint64_t power = 0;
+      const auto power_digits = read_digits(power);
+      if (power_digits == 0 || power_digits > 3) return std::nullopt;
+      exponent += small ? -static_cast<std::ptrdiff_t>(power) : static_cast<std::ptrdiff_t>(power);
+    }
+    if (exponent < -22 || exponent > 22 || !endsWord(at)) return std::nullopt;
+    static constexpr std::array<double, 23> powers{1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                                   1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                                                   1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+    const auto mantissa = static_cast<double>(digits);
+    const double value = exponent < 0 ? mantissa / powers[static_cast<std::size_t>(-exponent)]
+                                      : mantissa * powers[static_cast<std::size_t>(exponent)];
+    at_ = at;
+    return negative ? -value : value;
   }
 
   /// A number beyond the range of double is zero or infinite; from_chars does not say which.

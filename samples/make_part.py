@@ -127,7 +127,8 @@ def make_mesh():
             a, b = index(ring, segment), index(ring, segment + 1)
             c, d = index(ring + 1, segment + 1), index(ring + 1, segment)
             triangles += [(a, b, c), (a, c, d)]
-        triangles.append((index(len(profile) - 1, segment), index(len(profile) - 1, segment + 1), top))
+        last = len(profile) - 1
+        triangles.append((index(last, segment), index(last, segment + 1), top))
     return vertices, triangles
 
 

@@ -36,6 +36,7 @@ static void parseAndCheck(std::string_view bytes) {
 
 }  // namespace vdbdither
 
+// NOLINTNEXTLINE(readability-identifier-naming): the fuzzer calls it so
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   vdbdither::parseAndCheck({reinterpret_cast<const char*>(data), size});
   return 0;

@@ -48,17 +48,20 @@ std::string binaryStl(const Mesh& mesh, std::string_view header) {
 }
 
 std::string asciiStl(const Mesh& mesh, std::string_view newline) {
-  const std::string end(newline);
-  std::string text("solid part");
-  text += end;
+  std::string text;
+  const auto add_line = [&](std::string_view line) { text.append(line).append(newline); };
+  add_line("solid part");
   for (const Mesh::Triangle& triangle : mesh.triangles) {
-    text += "  facet normal 0.000000e+00 0.000000e+00 0.000000e+00" + end + "    outer loop" + end;
+    add_line("  facet normal 0.000000e+00 0.000000e+00 0.000000e+00");
+    add_line("    outer loop");
     for (const std::uint32_t vertex : triangle) {
-      text += "      vertex " + words(mesh.vertices[vertex]) + end;
+      add_line("      vertex " + words(mesh.vertices[vertex]));
     }
-    text += "    endloop" + end + "  endfacet" + end;
+    add_line("    endloop");
+    add_line("  endfacet");
   }
-  return text + "endsolid part" + end;
+  add_line("endsolid part");
+  return text;
 }
 
 std::string objText(const Mesh& mesh, std::string_view newline) {
