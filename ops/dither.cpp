@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "io/data_files.h"
+#include "io/vdb.h"
 #include "ops/kernels/shape_dither.h"
 #include "ops/kernels/solid.h"
 #include "ops/kernels/threshold_mask.h"
@@ -16,16 +18,16 @@ using openvdb::FloatGrid;
 using openvdb::Vec3SGrid;
 
 ThresholdMask readMask(const std::filesystem::path& path) {
-  if (!std::filesystem::exists(path))
+  if (!std::filesystem::exists(path)) {
     throw UsageError("--mask: no such file '" + path.string() + "'");
+  }
   try {
-    openvdb::io::File file(path.string());
-    file.open(false);
-    const auto grid = openvdb::gridPtrCast<FloatGrid>(file.readGrid("mask"));
-    if (!grid) throw DataError("grid 'mask' is not of floats");
-    return ThresholdMask(*grid);
-  } catch (const std::exception& error) {
-    throw DataError("--mask: '" + path.string() + "': " + error.what());
+    const GridConstPtr grid = readGrid(path, "mask");
+    const auto mask = openvdb::gridConstPtrCast<FloatGrid>(grid);
+    if (!mask) throw DataError("a mask is a grid of float, not of " + grid->valueType());
+    return ThresholdMask(*mask);
+  } catch (const DataError& error) {
+    throw DataError(std::string("--mask: ") + error.what());
   }
 }
 
@@ -105,9 +107,9 @@ class Dither : public Filter {
   void checkBand(double band_mm) const {
     const double needed_mm = std::max(dither_.largestDisplacementMm(), dither_.pitch_mm.length());
     if (dither_.amplitude == 0 || band_mm * (1 + 1e-6) >= needed_mm) return;
-    throw DataError("grid 'surface' holds distances up to " + shortestText(band_mm) +
-                    " mm, and --amplitude " + shortestText(amplitude_) + " on this lattice needs " +
-                    shortestText(needed_mm) + " mm");
+    const auto text = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4) + " mm"; };
+    throw DataError("grid 'surface' holds distances up to " + text(band_mm) + ", and --amplitude " +
+                    shortestText(amplitude_) + " on this lattice needs " + text(needed_mm));
   }
 
   std::string mask_ = "blue";

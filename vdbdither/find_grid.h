@@ -23,8 +23,8 @@ std::shared_ptr<const GridType> findGrid(const Grids& grids, std::string_view na
   }
   auto grid = openvdb::gridConstPtrCast<GridType>(found->second);
   if (!grid) {
-    throw DataError("grid '" + std::string(name) + "' is of type " + found->second->type() +
-                    ", not " + GridType::gridType());
+    throw DataError("grid '" + std::string(name) + "' is of " + found->second->valueType() +
+                    ", not of " + openvdb::typeNameAsString<typename GridType::ValueType>());
   }
   return grid;
 }

@@ -9,6 +9,7 @@
 #include "ops/kernels/closest_surface_voxel.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -21,37 +22,19 @@ using openvdb::Coord;
 
 namespace {
 
-/// The other side of one of a leaf's faces.
-class Neighbour {
- public:
-  Neighbour(openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>& surface,
-            const Coord& origin, ZRange valid)
-      : leaf_(surface.probeConstLeaf(origin)),
-        row_(rowWithin(origin.z(), valid)),
-        tile_inside_(!leaf_ && surface.getValue(origin) < 0.0F) {}
+/// A leaf's worth of distances of one sign, which stands in for a tile.
+constexpr std::array<float, 512> leafOf(float d) {
+  std::array<float, 512> values{};
+  values.fill(d);
+  return values;
+}
+constexpr std::array<float, 512> tile_inside = leafOf(-1);
+constexpr std::array<float, 512> tile_outside = leafOf(1);
 
-  /// 64 voxels of V as bits, the n-th at `offset_of(n)`.
-  template <typename OffsetOf>
-  [[nodiscard]] std::uint64_t inside(OffsetOf offset_of) const {
-    std::uint64_t word = 0;
-    for (unsigned n = 0; n < 64; ++n) {
-      const unsigned offset = offset_of(n);
-      const bool inside = leaf_ ? leaf_->buffer().data()[offset] < 0.0F : tile_inside_;
-      word |= std::uint64_t{inside && ((row_ >> (offset % 8)) & 1U)} << n;
-    }
-    return word;
-  }
-
- private:
-  const FloatLeaf* leaf_;
-  std::uint8_t row_;
-  bool tile_inside_;
-};
-
-/// Bit y of `column` moved to bit 8·y.
-std::uint64_t spread(std::uint64_t column) {
+/// The inside voxels of a layer across z, eight columns: bit 8·y.
+std::uint64_t layerInside(const float* values) {
   std::uint64_t word = 0;
-  for (unsigned y = 0; y < 8; ++y) word |= ((column >> y) & 1U) << (8 * y);
+  for (unsigned y = 0; y < 8; ++y) word |= std::uint64_t{values[8 * y] < 0.0F} << (8 * y);
   return word;
 }
 
@@ -79,32 +62,37 @@ int stepsUp(const std::uint64_t* column, int words, int z) {
 
 }  // namespace
 
+const float* SurfaceVoxels::valuesAt(const Coord& origin) {
+  if (const FloatLeaf* leaf = surface_.probeConstLeaf(origin)) return leaf->buffer().data();
+  return surface_.getValue(origin) < 0.0F ? tile_inside.data() : tile_outside.data();
+}
+
 LeafBits SurfaceVoxels::operator()(const FloatLeaf& leaf) {
   const Coord origin = leaf.origin();
   const LeafBits inside = insideBits(leaf, rowWithin(origin.z(), valid_));
   if (inside == no_bits) return no_bits;
 
-  const auto across = [&](int x, int y, int z) {
-    return Neighbour(surface_, origin.offsetBy(x, y, z), valid_);
-  };
-  const std::uint64_t below_x = across(-8, 0, 0).inside([](unsigned n) { return 7 * 64 + n; });
-  const std::uint64_t above_x = across(8, 0, 0).inside([](unsigned n) { return n; });
-  const std::uint64_t below_y =
-      across(0, -8, 0).inside([](unsigned n) { return n / 8 * 64 + 7 * 8 + n % 8; });
-  const std::uint64_t above_y =
-      across(0, 8, 0).inside([](unsigned n) { return n / 8 * 64 + n % 8; });
-  const std::uint64_t below_z = across(0, 0, -8).inside([](unsigned n) { return n * 8 + 7; });
-  const std::uint64_t above_z = across(0, 0, 8).inside([](unsigned n) { return n * 8; });
-
+  const float* below_x = valuesAt(origin.offsetBy(-8, 0, 0)) + 7 * 64;
+  const float* above_x = valuesAt(origin.offsetBy(8, 0, 0));
+  const float* below_y = valuesAt(origin.offsetBy(0, -8, 0)) + 7 * 8;
+  const float* above_y = valuesAt(origin.offsetBy(0, 8, 0));
+  const float* below_z = valid_.contains(origin.z() - 1) ? valuesAt(origin.offsetBy(0, 0, -8)) + 7
+                                                         : tile_outside.data();
+  const float* above_z =
+      valid_.contains(origin.z() + 8) ? valuesAt(origin.offsetBy(0, 0, 8)) : tile_outside.data();
   LeafBits surface;
   for (unsigned x = 0; x < 8; ++x) {
     const std::uint64_t here = inside[x];
+    surface[x] = 0;
+    if (here == 0) continue;
+    const std::uint64_t row_below_y = rowBelow(below_y + 64 * x, 0);
+    const std::uint64_t row_above_y = rowBelow(above_y + 64 * x, 0);
     const std::uint64_t enclosed =
-        (x > 0 ? inside[x - 1] : below_x) & (x < 7 ? inside[x + 1] : above_x) &
-        ((here << 8) | ((below_y >> (8 * x)) & 0xffU)) &
-        ((here >> 8) | (((above_y >> (8 * x)) & 0xffU) << 56)) &
-        (((here << 1) & everyRow(0xfe)) | spread(below_z >> (8 * x))) &
-        (((here >> 1) & everyRow(0x7f)) | (spread(above_z >> (8 * x)) << 7));
+        (x > 0 ? inside[x - 1] : wordBelow(below_x, 0)) &
+        (x < 7 ? inside[x + 1] : wordBelow(above_x, 0)) &  //
+        (here << 8 | row_below_y) & (here >> 8 | row_above_y << 56) &
+        ((here << 1 & everyRow(0xfe)) | layerInside(below_z + 64 * x)) &
+        ((here >> 1 & everyRow(0x7f)) | layerInside(above_z + 64 * x) << 7);
     surface[x] = here & ~enclosed;
   }
   return surface;
@@ -144,36 +132,50 @@ ClosestSurfaceVoxel::ClosestSurfaceVoxel(const openvdb::FloatTree& surface_voxel
 }
 
 bool ClosestSurfaceVoxel::visit(const Coord& origin) {
-  const Coord& halo = disk_.halo_;
   const Coord& reach = disk_.leaves_;
-  const int width_y = 8 + 2 * halo.y();
   origin_ = origin;
   leaves_.clear();
+  gathered_ = false;
   bool any = false;
   for (int x = -reach.x(); x <= reach.x(); ++x) {
     for (int y = -reach.y(); y <= reach.y(); ++y) {
       for (int z = -reach.z(); z <= reach.z(); ++z) {
-        const FloatLeaf* leaf =
-            surface_voxels_.probeConstLeaf(origin.offsetBy(8 * x, 8 * y, 8 * z));
-        leaves_.push_back(leaf);
-        if (!leaf) continue;
-        if (!std::exchange(any, true)) std::fill(tile_.begin(), tile_.end(), 0);
-        const int bit = 8 * (z + reach.z());
-        for (int i = std::max(0, -halo.x() - 8 * x); i < std::min(8, 8 + halo.x() - 8 * x); ++i) {
-          const auto word = leaf->getValueMask().getWord<std::uint64_t>(static_cast<unsigned>(i));
-          for (int j = std::max(0, -halo.y() - 8 * y); j < std::min(8, 8 + halo.y() - 8 * y); ++j) {
-            const int column = (8 * x + i + halo.x()) * width_y + 8 * y + j + halo.y();
-            tile_[static_cast<std::size_t>(column * disk_.words_ + bit / 64)] |=
-                ((word >> (8 * j)) & 0xffU) << (bit % 64);
-          }
-        }
+        leaves_.push_back(surface_voxels_.probeConstLeaf(origin.offsetBy(8 * x, 8 * y, 8 * z)));
+        any |= leaves_.back() != nullptr;
       }
     }
   }
   return any;
 }
 
-std::optional<ClosestSurfaceVoxel::Found> ClosestSurfaceVoxel::operator()(unsigned offset) const {
+void ClosestSurfaceVoxel::gather() {
+  const Coord& halo = disk_.halo_;
+  const Coord& reach = disk_.leaves_;
+  const int width_y = 8 + 2 * halo.y();
+  std::fill(tile_.begin(), tile_.end(), 0);
+  const FloatLeaf* const* leaf = leaves_.data();
+  for (int x = -8 * reach.x(); x <= 8 * reach.x(); x += 8) {
+    for (int y = -8 * reach.y(); y <= 8 * reach.y(); y += 8) {
+      for (int bit = 0; bit <= 16 * reach.z(); bit += 8, ++leaf) {
+        if (!*leaf) continue;
+        for (int i = std::max(0, -halo.x() - x); i < std::min(8, 8 + halo.x() - x); ++i) {
+          const auto word =
+              (*leaf)->getValueMask().getWord<std::uint64_t>(static_cast<unsigned>(i));
+          if (word == 0) continue;
+          const int row = (x + i + halo.x()) * width_y + y + halo.y();
+          for (int j = std::max(0, -halo.y() - y); j < std::min(8, 8 + halo.y() - y); ++j) {
+            tile_[static_cast<std::size_t>((row + j) * disk_.words_ + bit / 64)] |=
+                (word >> (8 * j) & 0xffU) << (bit % 64);
+          }
+        }
+      }
+    }
+  }
+  gathered_ = true;
+}
+
+std::optional<ClosestSurfaceVoxel::Found> ClosestSurfaceVoxel::operator()(unsigned offset) {
+  if (!gathered_) gather();
   const Coord local = FloatLeaf::offsetToLocalCoord(offset);
   const Coord& halo = disk_.halo_;
   const int z = local.z() + 8 * disk_.leaves_.z();

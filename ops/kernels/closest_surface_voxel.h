@@ -23,6 +23,8 @@ class SurfaceVoxels {
   [[nodiscard]] LeafBits operator()(const FloatLeaf& leaf);
 
  private:
+  const float* valuesAt(const openvdb::Coord& origin);
+
   openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> surface_;
   ZRange valid_;
 };
@@ -77,13 +79,16 @@ class ClosestSurfaceVoxel {
   [[nodiscard]] const std::vector<const FloatLeaf*>& leaves() const { return leaves_; }
 
   /// v̄ of the voxel at `offset` in the leaf, nothing where none is within the radius.
-  [[nodiscard]] std::optional<Found> operator()(unsigned offset) const;
+  [[nodiscard]] std::optional<Found> operator()(unsigned offset);
 
  private:
+  void gather();
+
   openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> surface_voxels_;
   const SearchDisk& disk_;
   openvdb::Coord origin_;
   std::vector<const FloatLeaf*> leaves_;
+  bool gathered_ = false;
   std::vector<std::uint64_t> tile_;  ///< ∂V in the leaf and its halo: a column along z per (x, y)
 };
 

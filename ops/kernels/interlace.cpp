@@ -62,9 +62,6 @@ openvdb::BoolGrid::Ptr interlacedByPicking(const openvdb::FloatGrid& refined, ZR
   }
 
   std::vector<CoordBBox> boxes = insideTiles(refined.tree(), core);
-  std::erase_if(boxes, [&](const CoordBBox& box) {
-    return box.dim().x() == 8 && origins.contains(plainOrigin(box.min()));
-  });
   for (CoordBBox& box : boxes) {
     box.min().y() >>= 1;
     box.max().y() >>= 1;

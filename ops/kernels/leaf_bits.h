@@ -1,8 +1,15 @@
 #pragma once
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -31,23 +38,46 @@ inline std::uint8_t rowWithin(int leaf_z, ZRange layers) {
   return static_cast<std::uint8_t>((1U << end) - (1U << begin));
 }
 
-/// The bits of the voxels whose value satisfies `predicate`.
-template <typename Predicate>
-LeafBits bitsWhere(const float* values, Predicate predicate) {
-  LeafBits bits;
-  for (std::uint64_t& word : bits) {
-    word = 0;
-    for (int n = 0; n < 64; ++n) word |= std::uint64_t{predicate(values[n])} << n;
-    values += 64;
-  }
-  return bits;
+/// The bits of eight values on end, a row along z, that are less than `limit`.
+inline std::uint8_t rowBelow(const float* values, float limit) {
+#ifdef __SSE2__
+  const __m128 limits = _mm_set1_ps(limit);
+  const int low = _mm_movemask_ps(_mm_cmplt_ps(_mm_loadu_ps(values), limits));
+  const int high = _mm_movemask_ps(_mm_cmplt_ps(_mm_loadu_ps(values + 4), limits));
+  return static_cast<std::uint8_t>(low | high << 4);
+#else
+  unsigned row = 0;
+  for (unsigned n = 0; n < 8; ++n) row |= unsigned{values[n] < limit} << n;
+  return static_cast<std::uint8_t>(row);
+#endif
+}
+
+/// The same for eight rows on end.
+inline std::uint64_t wordBelow(const float* values, float limit) {
+  std::uint64_t word = 0;
+  for (unsigned y = 0; y < 8; ++y)
+    word |= std::uint64_t{rowBelow(values + 8 * y, limit)} << (8 * y);
+  return word;
 }
 
 /// V, the plain voxelization: the voxels with d < 0, active or not, of the rows that `row` lets
 /// through.
 inline LeafBits insideBits(const FloatLeaf& leaf, std::uint8_t row) {
-  LeafBits bits = bitsWhere(leaf.buffer().data(), [](float d) { return d < 0.0F; });
-  for (std::uint64_t& word : bits) word &= everyRow(row);
+  const float* values = leaf.buffer().data();
+  LeafBits bits;
+  for (unsigned x = 0; x < 8; ++x) bits[x] = wordBelow(values + 64 * x, 0) & everyRow(row);
+  return bits;
+}
+
+/// The active voxels with |d| ≤ `bound`, of the rows that `row` lets through.
+inline LeafBits bandBits(const FloatLeaf& leaf, float bound, std::uint8_t row) {
+  const float* values = leaf.buffer().data();
+  const float beyond = std::nextafter(bound, std::numeric_limits<float>::infinity());
+  LeafBits bits;
+  for (unsigned x = 0; x < 8; ++x, values += 64) {
+    bits[x] = leaf.getValueMask().getWord<std::uint64_t>(x) & everyRow(row);
+    if (bits[x] != 0) bits[x] &= wordBelow(values, beyond) & ~wordBelow(values, -bound);
+  }
   return bits;
 }
 

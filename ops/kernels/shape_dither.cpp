@@ -79,7 +79,7 @@ class AtClosest {
     return greatest;
   }
 
-  float operator()(unsigned offset, float) const {
+  float operator()(unsigned offset, float) {
     const auto found = closest_(offset);
     return found ? found->value : 0.0F;
   }
@@ -161,15 +161,12 @@ ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
         const FloatLeaf& leaf = *leaves[n];
         const float* distances = leaf.buffer().data();
         const std::uint8_t within = rowWithin(leaf.origin().z(), core);
-        const float bound = f.visit(leaf);
         FloatLeaf* moved = displaced ? displaced->tree().probeLeaf(leaf.origin()) : nullptr;
+        const float f_bound = f.visit(leaf);
+        const float bound = moved ? std::numeric_limits<float>::infinity() : f_bound;
 
         LeafBits inside = insideBits(leaf, within);
-        LeafBits undecided =
-            bitsWhere(distances, [&](float d) { return moved || std::abs(d) <= bound; });
-        for (unsigned x = 0; x < 8; ++x) {
-          undecided[x] &= leaf.getValueMask().getWord<std::uint64_t>(x) & everyRow(within);
-        }
+        const LeafBits undecided = bandBits(leaf, bound, within);
         forEachBit(undecided, [&](unsigned offset) {
           const float d = distances[offset] + f(offset, distances[offset]);
           const std::uint64_t bit = std::uint64_t{1} << (offset % 64);

@@ -9,35 +9,53 @@ namespace vdbdither {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-std::vector<CoordBBox> insideTiles(const openvdb::FloatTree& surface, ZRange layers) {
-  std::vector<CoordBBox> boxes;
-  const auto keep = [&](CoordBBox box) {
-    box.min().z() = std::max(box.min().z(), layers.begin);
-    box.max().z() = std::min(box.max().z(), layers.end - 1);
-    if (!box.empty()) boxes.push_back(box);
-  };
+namespace {
 
-  // Tiles of 8³, where nearly all are: only the layers asked for, not the whole node of 128³.
-  using Node = openvdb::FloatTree::RootNodeType::ChildNodeType::ChildNodeType;
+/// Appends the inside tiles in the tables of all nodes of one kind: only those that hold some of
+/// `layers`, not the whole table, and as one box those that stand on each other.
+template <typename Node>
+void addInsideTiles(const openvdb::FloatTree& surface, ZRange layers,
+                    std::vector<CoordBBox>& boxes) {
+  constexpr int edge = 1 << Node::LOG2DIM;
+  constexpr int tile = Node::ChildNodeType::DIM;
   std::vector<const Node*> nodes;
   surface.getNodes(nodes);
   for (const Node* node : nodes) {
-    const int first = std::clamp((layers.begin - node->origin().z()) >> 3, 0, 16);
-    const int last = std::clamp((layers.end - 1 - node->origin().z()) >> 3, -1, 15);
-    for (int row = 0; row < 256; ++row) {
-      for (int z = first; z <= last; ++z) {
-        const auto n = static_cast<openvdb::Index>(16 * row + z);
-        if (node->isChildMaskOn(n) || !(node->getTable()[n].getValue() < 0.0F)) continue;
-        keep(CoordBBox::createCube(node->offsetToGlobalCoord(n), 8));
+    const int bottom = node->origin().z();
+    const int begin = std::max(0, (layers.begin - bottom) / tile);
+    const int end = std::min(edge, (layers.end - bottom + tile - 1) / tile);
+    for (int row = 0; row < edge * edge; ++row) {
+      const auto inside = [&](int z) {
+        const auto n = static_cast<openvdb::Index>(edge * row + z);
+        return !node->isChildMaskOn(n) && node->getTable()[n].getValue() < 0.0F;
+      };
+      for (int z = begin; z < end; ++z) {
+        if (!inside(z)) continue;
+        const int first = z;
+        while (z + 1 < end && inside(z + 1)) ++z;
+        const Coord corner = node->offsetToGlobalCoord(static_cast<openvdb::Index>(edge * row));
+        boxes.emplace_back(corner.offsetBy(0, 0, first * tile),
+                           corner.offsetBy(tile - 1, tile - 1, (z + 1) * tile - 1));
       }
     }
   }
+}
 
-  auto tile = surface.cbeginValueAll();
-  tile.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 2);
-  for (; tile; ++tile) {
-    if (*tile < 0.0F) keep(tile.getBoundingBox());
+}  // namespace
+
+std::vector<CoordBBox> insideTiles(const openvdb::FloatTree& surface, ZRange layers) {
+  using Upper = openvdb::FloatTree::RootNodeType::ChildNodeType;
+  std::vector<CoordBBox> boxes;
+  addInsideTiles<Upper::ChildNodeType>(surface, layers, boxes);
+  addInsideTiles<Upper>(surface, layers, boxes);
+  for (auto tile = surface.root().cbeginValueAll(); tile; ++tile) {
+    if (*tile < 0.0F) boxes.push_back(CoordBBox::createCube(tile.getCoord(), Upper::DIM));
   }
+  for (CoordBBox& box : boxes) {
+    box.min().z() = std::max(box.min().z(), layers.begin);
+    box.max().z() = std::min(box.max().z(), layers.end - 1);
+  }
+  std::erase_if(boxes, [](const CoordBBox& box) { return box.empty(); });
   return boxes;
 }
 

@@ -16,13 +16,14 @@ struct SolidLeaf {
   LeafBits inside;
 };
 
-/// The tiles of `surface` that lie inside (d < 0), cut to `layers`.
+/// The tiles of `surface` that lie inside (d < 0), cut to `layers`; those that stand on each other
+/// are one box.
 std::vector<openvdb::CoordBBox> insideTiles(const openvdb::FloatTree& surface, ZRange layers);
 
 /// An empty grid `solid`: active and true inside, false outside.
 openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform);
 
-/// The grid `solid` of some leaves and of boxes filled whole, which do not meet the leaves.
+/// The grid `solid` of boxes filled whole and of leaves, which replace what the boxes filled there.
 /// Canonical: its topology is as coarse as its values allow, whatever the topology it came from.
 openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform,
                                      std::span<const SolidLeaf> leaves,

@@ -1,12 +1,16 @@
 #include <filesystem>
+#include <fstream>
+#include <unistd.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <openvdb/tools/Prune.h>
 
+#include "io/vdb.h"
+#include "ops/kernels/threshold_mask.h"
 #include "tests/support/dither_reference.h"
+#include "tests/support/filters.h"
 #include "vdbdither/errors.h"
-#include "vdbdither/options.h"
-#include "vdbdither/registry.h"
 
 namespace vdbdither {
 namespace {
@@ -16,22 +20,9 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::Vec3d;
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-
-struct Verb {
-  std::unique_ptr<Operator> op;
-  Filter& filter;
-};
-
-Verb verb(const std::string& name, const std::vector<std::string>& arguments) {
-  auto op = findOperator(name).make();
-  Options options;
-  op->declare(options);
-  options.parse(arguments);
-  auto& filter = dynamic_cast<Filter&>(*op);
-  return {std::move(op), filter};
-}
 
 const Lattice mimaki = test::latticeAround({0.042, 0.084, 0.022}, {0.6, 0.6, 0.6}, 0.3);
 
@@ -40,44 +31,202 @@ Schema ballOn(const Lattice& lattice) {
       lattice, {{"surface", test::sampled(test::sphere({0.01, 0.02, -0.1}, 0.55), lattice, 0.2)}});
 }
 
-/// Filled slab by slab, each slab only its own layers.
-test::Voxels stitched(Filter& filter, const Schema& schema, int height, const Lattice& out,
-                      const char* name) {
-  test::Voxels voxels(out.box, 0);
-  for (const auto& [core, grids] : test::runInSlabs(filter, schema, height)) {
-    const auto grid = openvdb::gridConstPtrCast<BoolGrid>(grids.at(name));
-    for (auto v = grid->cbeginValueOn(); v; ++v) {
-      EXPECT_TRUE(core.contains(v.getBoundingBox().min().z()) &&
-                  core.contains(v.getBoundingBox().max().z()));
-    }
-    CoordBBox layers = out.box;
-    layers.min().z() = core.begin;
-    layers.max().z() = core.end - 1;
-    for (auto v = layers.begin(); v; ++v) voxels[*v] = grid->tree().getValue(*v);
-  }
-  return voxels;
-}
-
 TEST(Dither, MakesTheSameOfSlabsOfAnyHeightWhateverLiesBeyondItsReach) {
   const Schema plain = ballOn(mimaki);
   Schema with_normals = plain;
-  with_normals.grids.merge(test::runWhole(verb("normals", {}).filter, plain));
+  with_normals.grids.merge(test::runWhole(*test::filterCalled("normals"), plain));
   for (const Schema& schema : {plain, with_normals}) {
     for (const std::string at : {"closest", "foot", "voxel"}) {
       for (const std::string amplitude : {"4", "8"}) {
-        const Verb dither =
-            verb("dither", {"--mask", "white", "--at", at, "--amplitude", amplitude});
+        const auto dither =
+            test::filterCalled("dither", {"--mask", "white", "--at", at, "--amplitude", amplitude});
         const auto solid =
-            openvdb::gridConstPtrCast<BoolGrid>(test::runWhole(dither.filter, schema).at("solid"));
+            openvdb::gridConstPtrCast<BoolGrid>(test::runWhole(*dither, schema).at("solid"));
         const test::Voxels whole = test::dense(*solid, mimaki.box);
         for (const int height : {8, 16, 64}) {
           EXPECT_EQ(
-              test::differences(stitched(dither.filter, schema, height, mimaki, "solid"), whole), 0)
+              test::differences(test::solidOfSlabs(*dither, schema, height, mimaki.box), whole), 0)
               << at << " " << height;
         }
       }
     }
   }
+}
+
+TEST(Dither, LeavesItsInputUntouched) {
+  const Schema schema = ballOn(mimaki);
+  const auto before = openvdb::gridConstPtrCast<FloatGrid>(schema.grids.at("surface"))->deepCopy();
+  test::runWhole(*test::filterCalled("dither", {"--mask", "white", "--displaced"}), schema);
+  const auto after = openvdb::gridConstPtrCast<FloatGrid>(schema.grids.at("surface"));
+  EXPECT_EQ(test::dense(*before, mimaki.box), test::dense(*after, mimaki.box));
+  EXPECT_TRUE(before->tree().hasSameTopology(after->tree()));
+}
+
+TEST(Dither, MakesNothingOfEmptySlabs) {
+  const Schema schema = test::schemaOf(mimaki, {{"surface", FloatGrid::create(0.2F)}});
+  const Grids out =
+      test::runWhole(*test::filterCalled("dither", {"--mask", "white", "--displaced"}), schema);
+  EXPECT_TRUE(openvdb::gridConstPtrCast<BoolGrid>(out.at("solid"))->empty());
+  EXPECT_TRUE(openvdb::gridConstPtrCast<FloatGrid>(out.at("displaced"))->empty());
+}
+
+TEST(Dither, FillsTheInteriorWithTiles) {
+  const Lattice lattice = test::latticeAround(mimaki.pitch_mm, Vec3d(1.0), 0.2);
+  const Schema schema = test::schemaOf(
+      lattice, {{"surface", test::sampled(test::sphere(Vec3d(0.0), 1), lattice, 0.2)}});
+  const auto solid = openvdb::gridConstPtrCast<BoolGrid>(
+      test::runWhole(*test::filterCalled("dither", {"--mask", "white"}), schema).at("solid"));
+  EXPECT_GT(solid->tree().activeTileCount(), 0U);
+  auto canonical = solid->deepCopy();
+  canonical->tree().voxelizeActiveTiles();
+  openvdb::tools::prune(canonical->tree());
+  EXPECT_EQ(canonical->tree().activeTileCount(), solid->tree().activeTileCount());
+  EXPECT_EQ(canonical->tree().leafCount(), solid->tree().leafCount());
+}
+
+TEST(Dither, PassesOnWhatItReadAndAnnouncesWhatItMakes) {
+  const Schema in = ballOn(mimaki);
+  const Schema out = test::filterCalled("dither", {"--mask", "none", "--displaced"})->plan(in);
+  EXPECT_EQ(out.grids.at("surface"), in.grids.at("surface"));
+  EXPECT_EQ(out.lattice, in.lattice);
+  EXPECT_EQ(out.grids.at("solid")->valueType(), "bool");
+  EXPECT_EQ(out.grids.at("displaced")->getGridClass(), openvdb::GRID_LEVEL_SET);
+  EXPECT_EQ(out.grids.at("displaced")->transform(), out.grids.at("surface")->transform());
+  EXPECT_TRUE(out.grids.at("displaced")->empty());
+}
+
+TEST(Dither, WithoutAMaskIsPlainVoxelizationAndReadsNoHalo) {
+  const Schema schema = ballOn(mimaki);
+  const auto dither = test::filterCalled("dither", {"--mask", "none"});
+  const auto solid =
+      openvdb::gridConstPtrCast<BoolGrid>(test::runWhole(*dither, schema).at("solid"));
+  const auto surface = openvdb::gridConstPtrCast<FloatGrid>(schema.grids.at("surface"));
+  EXPECT_EQ(test::dense(*solid, mimaki.box), test::plainVoxels(test::dense(*surface, mimaki.box)));
+  ASSERT_EQ(dither->reads().size(), 1U);
+  EXPECT_EQ(dither->reads()[0].reach.below, 0);
+}
+
+TEST(Dither, WhiteNoiseDependsOnTheSeedAlone) {
+  const Schema schema = ballOn(mimaki);
+  const auto solid = [&](const char* seed) {
+    const auto dither = test::filterCalled("dither", {"--mask", "white", "--seed", seed});
+    return test::dense(
+        *openvdb::gridConstPtrCast<BoolGrid>(test::runWhole(*dither, schema).at("solid")),
+        mimaki.box);
+  };
+  EXPECT_EQ(solid("4"), solid("4"));
+  EXPECT_GT(test::differences(solid("4"), solid("5")), 100);
+}
+
+/// Writes a grid `mask` to a file that goes away with the test.
+class MaskFile : public testing::Test {
+ protected:
+  std::string write(const FloatGrid::Ptr& mask) {
+    mask->setName("mask");
+    openvdb::io::File(path_.string()).write({mask});
+    return path_.string();
+  }
+  static void SetUpTestSuite() { initializeVdb(); }
+  ~MaskFile() override { std::filesystem::remove(path_); }
+
+  static FloatGrid::Ptr filled(const CoordBBox& box, float value) {
+    auto grid = FloatGrid::create(0.0F);
+    grid->denseFill(box, value);
+    return grid;
+  }
+
+  static auto planning(const std::string& mask) {
+    return [mask] { test::filterCalled("dither", {"--mask", mask})->plan(ballOn(mimaki)); };
+  }
+
+  std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() / ("mask" + std::to_string(getpid()) + ".vdb");
+};
+
+TEST_F(MaskFile, IsReadAtTheAbsoluteIndexModuloItsSize) {
+  auto grid = filled(CoordBBox(Coord(0), Coord(1, 2, 3)), 0.5F);
+  float value = 0.01F;
+  for (auto voxel = grid->beginValueOn(); voxel; ++voxel) voxel.setValue(value += 0.03F);
+  const ThresholdMask mask(*grid);
+  for (const Coord& at : {Coord(0), Coord(1, 2, 3), Coord(0, 2, 1)}) {
+    EXPECT_EQ(mask(at), grid->tree().getValue(at));
+    EXPECT_EQ(mask(at + Coord(20, -30, 400)), grid->tree().getValue(at));
+    EXPECT_EQ(mask(at - Coord(2, 3, 4)), grid->tree().getValue(at));
+  }
+}
+
+TEST_F(MaskFile, OfOneHalfEverywherePrintsPlainVoxels) {
+  const Schema schema = ballOn(mimaki);
+  const auto solid = [&](const std::string& mask) {
+    const auto dither = test::filterCalled("dither", {"--mask", mask});
+    return test::dense(
+        *openvdb::gridConstPtrCast<BoolGrid>(test::runWhole(*dither, schema).at("solid")),
+        mimaki.box);
+  };
+  EXPECT_EQ(solid(write(filled(CoordBBox(Coord(0), Coord(3)), 0.5F))), solid("none"));
+}
+
+TEST_F(MaskFile, RefusesAMissingFile) {
+  EXPECT_THAT(planning("nowhere.vdb"),
+              ThrowsMessage<UsageError>(HasSubstr("--mask: no such file 'nowhere.vdb'")));
+}
+
+TEST_F(MaskFile, RefusesThresholdsOutsideTheOpenUnitInterval) {
+  for (const float bad : {0.0F, 1.0F, -3.0F, std::nanf("")}) {
+    auto grid = filled(CoordBBox(Coord(0), Coord(3)), 0.5F);
+    grid->tree().setValue({1, 2, 3}, bad);
+    EXPECT_THAT(planning(write(grid)),
+                ThrowsMessage<DataError>(HasSubstr("thresholds between 0 and 1")));
+  }
+}
+
+TEST_F(MaskFile, RefusesWhatIsNotABoxFromTheOrigin) {
+  auto holed = filled(CoordBBox(Coord(0), Coord(3)), 0.5F);
+  holed->tree().setValueOff({1, 1, 1});
+  EXPECT_THAT(planning(write(holed)), ThrowsMessage<DataError>(HasSubstr("--mask: ")));
+  EXPECT_THAT(planning(write(filled(CoordBBox(Coord(1), Coord(3)), 0.5F))),
+              ThrowsMessage<DataError>(HasSubstr("here 27 are active from 1,1,1 to 3,3,3")));
+  EXPECT_THAT(planning(write(FloatGrid::create(0.0F))),
+              ThrowsMessage<DataError>(HasSubstr("there are none")));
+}
+
+TEST_F(MaskFile, RefusesWhatIsNoVdbFile) {
+  std::ofstream(path_) << "not a grid";
+  EXPECT_THAT(planning(path_.string()),
+              ThrowsMessage<DataError>(AllOf(HasSubstr("--mask: "), HasSubstr(path_.string()))));
+}
+
+TEST(Dither, RefusesASurfaceThatDoesNotReachFarEnough) {
+  const Schema thin = test::schemaOf(mimaki, {{"surface", FloatGrid::create(0.09F)}});
+  EXPECT_THAT(
+      [&] {
+        test::filterCalled("dither", {"--mask", "white"})->plan(thin);
+      },
+      ThrowsMessage<DataError>(
+          "grid 'surface' holds distances up to 0.09 mm, and --amplitude 4 on this "
+          "lattice needs 0.0965 mm"));
+  EXPECT_NO_THROW(test::filterCalled("dither", {"--mask", "none"})->plan(thin));
+}
+
+TEST(Dither, RefusesToRunWithoutASurface) {
+  const Schema none = test::schemaOf(mimaki, {{"solid", BoolGrid::create(false)}});
+  EXPECT_THAT(
+      [&] {
+        test::filterCalled("dither", {"--mask", "white"})->plan(none);
+      },
+      ThrowsMessage<DataError>("no grid 'surface'; there is 'solid'"));
+  const Schema wrong = test::schemaOf(mimaki, {{"surface", BoolGrid::create(false)}});
+  EXPECT_THAT(
+      [&] {
+        test::filterCalled("dither", {"--mask", "white"})->plan(wrong);
+      },
+      ThrowsMessage<DataError>("grid 'surface' is of bool, not of float"));
+}
+
+TEST(Dither, RefusesAmplitudesBeyondEightAndPlacesItDoesNotKnow) {
+  EXPECT_THROW(test::filterCalled("dither", {"--amplitude", "8.1"}), UsageError);
+  EXPECT_THROW(test::filterCalled("dither", {"--amplitude", "-1"}), UsageError);
+  EXPECT_THROW(test::filterCalled("dither", {"--at", "surface"}), UsageError);
 }
 
 }  // namespace

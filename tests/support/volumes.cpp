@@ -72,13 +72,6 @@ FloatGrid::Ptr sampled(const Distance& distance, const Lattice& lattice, double 
   return grid;
 }
 
-Schema schemaOf(const Lattice& lattice, Grids grids) {
-  Schema schema;
-  schema.lattice = lattice;
-  schema.grids = std::move(grids);
-  return schema;
-}
-
 namespace {
 
 template <typename T, typename GridType>
@@ -107,7 +100,7 @@ int differences(const Voxels& a, const Voxels& b) {
   return count;
 }
 
-int components(Voxels voxels) {
+int components(Voxels voxels, Touching touching) {
   int count = 0;
   std::vector<Coord> open;
   for (auto start = voxels.box().begin(); start; ++start) {
@@ -119,62 +112,15 @@ int components(Voxels voxels) {
       const Coord ijk = open.back();
       open.pop_back();
       for (auto near = CoordBBox(ijk.offsetBy(-1), ijk.offsetBy(1)).begin(); near; ++near) {
-        if (!voxels.at(*near, 0)) continue;
+        const Coord step = *near - ijk;
+        const bool by_face = std::abs(step.x()) + std::abs(step.y()) + std::abs(step.z()) == 1;
+        if (!voxels.at(*near, 0) || (touching == Touching::faces && !by_face)) continue;
         voxels[*near] = 0;
         open.push_back(*near);
       }
     }
   }
   return count;
-}
-
-Grids runWhole(Filter& filter, const Schema& schema) {
-  filter.plan(schema);
-  Slab slab{schema.lattice.layers(), schema.lattice.layers(), {}};
-  for (const Read& read : filter.reads()) slab.grids[read.grid] = schema.grids.at(read.grid);
-  return filter.run(slab);
-}
-
-namespace {
-
-/// A copy of `grid` in which every voxel of every leaf outside `valid` is active and holds rubbish.
-template <typename GridType>
-GridConstPtr spoiled(const GridType& grid, ZRange valid,
-                     const typename GridType::ValueType& rubbish) {
-  auto copy = grid.deepCopy();
-  for (auto leaf = copy->tree().beginLeaf(); leaf; ++leaf) {
-    for (openvdb::Index n = 0; n < 512; ++n) {
-      if (!valid.contains(leaf->offsetToGlobalCoord(n).z())) leaf->setValueOn(n, rubbish);
-    }
-  }
-  return copy;
-}
-
-GridConstPtr spoiled(const GridConstPtr& grid, ZRange valid) {
-  if (const auto floats = openvdb::gridConstPtrCast<FloatGrid>(grid))
-    return spoiled(*floats, valid, -0.011F);
-  return spoiled(*openvdb::gridConstPtrCast<Vec3SGrid>(grid), valid, Vec3s(0.6F, 0.0F, -0.8F));
-}
-
-}  // namespace
-
-std::vector<std::pair<ZRange, Grids>> runInSlabs(Filter& filter, const Schema& schema, int height) {
-  filter.plan(schema);
-  const ZRange layers = schema.lattice.layers();
-  std::vector<std::pair<ZRange, Grids>> results;
-  for (int begin = alignedToLeaves(layers).begin; begin < layers.end; begin += height) {
-    Slab slab;
-    slab.core = intersection({begin, begin + height}, layers);
-    slab.valid = slab.core;
-    for (const Read& read : filter.reads()) {
-      const ZRange reach = intersection(
-          {slab.core.begin - read.reach.below, slab.core.end + read.reach.above}, layers);
-      slab.valid = {std::min(slab.valid.begin, reach.begin), std::max(slab.valid.end, reach.end)};
-      slab.grids[read.grid] = spoiled(schema.grids.at(read.grid), reach);
-    }
-    results.emplace_back(slab.core, filter.run(slab));
-  }
-  return results;
 }
 
 }  // namespace vdbdither::test

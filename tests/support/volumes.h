@@ -5,9 +5,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "vdbdither/operator.h"
-#include "vdbdither/schema.h"
-#include "vdbdither/slab.h"
+#include "vdbdither/lattice.h"
 
 namespace vdbdither::test {
 
@@ -29,9 +27,6 @@ Lattice latticeAround(const openvdb::Vec3d& pitch_mm, const openvdb::Vec3d& exte
 
 /// `surface` on a lattice: active where |d| ≤ `band_mm`, ±`band_mm` elsewhere and in tiles.
 openvdb::FloatGrid::Ptr sampled(const Distance& distance, const Lattice& lattice, double band_mm);
-
-/// A schema of these grids on a lattice.
-Schema schemaOf(const Lattice& lattice, Grids grids);
 
 /// A dense array over a box of voxels, for references that shall be plain.
 template <typename T>
@@ -69,14 +64,8 @@ Volume<openvdb::Vec3s> dense(const openvdb::Vec3SGrid& grid, const openvdb::Coor
 /// Where two volumes over one box differ.
 int differences(const Voxels& a, const Voxels& b);
 
-/// How many groups of voxels there are that touch by faces, edges or corners.
-int components(Voxels voxels);
-
-/// What `filter`, planned on these grids, makes of the whole lattice in one slab.
-Grids runWhole(Filter& filter, const Schema& schema);
-
-/// What it makes slab by slab: each of `height` layers, cut at multiples of eight. Every slab gets
-/// its own copy of what the filter declares to read, and nothing but rubbish beyond its reach.
-std::vector<std::pair<ZRange, Grids>> runInSlabs(Filter& filter, const Schema& schema, int height);
+/// How many groups of voxels there are that touch by faces, or by faces, edges and corners.
+enum class Touching { faces, corners };
+int components(Voxels voxels, Touching touching);
 
 }  // namespace vdbdither::test

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/support/volumes.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither::test {
+
+/// The registered filter of that name with its options set.
+std::unique_ptr<Filter> filterCalled(const std::string& name,
+                                     const std::vector<std::string>& arguments = {});
+
+/// A schema of these grids on a lattice.
+Schema schemaOf(const Lattice& lattice, Grids grids);
+
+/// What `filter`, planned on these grids, makes of the whole lattice in one slab.
+Grids runWhole(Filter& filter, const Schema& schema);
+
+/// What it makes slab by slab: each of `height` layers, cut at multiples of eight. Every slab gets
+/// its own copy of what the filter declares to read, and nothing but rubbish beyond its reach.
+std::vector<std::pair<ZRange, Grids>> runInSlabs(Filter& filter, const Schema& schema, int height);
+
+/// The grid `solid` of all those slabs over `box`. Fails the test where one holds voxels outside
+/// its core.
+Voxels solidOfSlabs(Filter& filter, const Schema& schema, int height,
+                    const openvdb::CoordBBox& box);
+
+}  // namespace vdbdither::test
