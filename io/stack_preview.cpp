@@ -36,8 +36,10 @@ StackPreview::StackPreview(const openvdb::Vec3d& pitch_mm, std::uint32_t width,
   const double width_mm = width * pitch_mm.x();
   const double front_mm = layers.size() * pitch_mm.z();
   const double slice_mm = height * pitch_mm.y();
-  pixel_mm_ = std::max(2 * width_mm / (largest_width - 3 * margin - 2),
-                       std::max(front_mm, slice_mm) / (largest_height - 2 * margin - 1));
+  // As large as the picture allows, but a voxel need not be more than eight pixels.
+  pixel_mm_ = std::max({2 * width_mm / (largest_width - 3 * margin - 2),
+                        std::max(front_mm, slice_mm) / (largest_height - 2 * margin - 1),
+                        std::max({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()}) / 8});
   columns_ = pixels(width_mm, pixel_mm_);
   front_rows_ = pixels(front_mm, pixel_mm_);
   slice_rows_ = pixels(slice_mm, pixel_mm_);
@@ -128,7 +130,7 @@ std::vector<StackPreview::Pixel> StackPreview::front() const {
   // The surface is a staircase of voxels: its slope is that of a plane fitted to the pixels around
   // that belong to it.
   const double step_mm = std::max({pitch_mm_.x(), pitch_mm_.y(), pitch_mm_.z(), pixel_mm_});
-  const int radius = std::clamp(static_cast<int>(std::ceil(2 * step_mm / pixel_mm_)), 2, 12);
+  const int radius = std::clamp(static_cast<int>(std::ceil(2 * step_mm / pixel_mm_)), 2, 8);
   std::vector<Pixel> result(surface.size());
   tbb::parallel_for(0, front_rows_, [&](int row) {
     for (int column = 0; column < columns_; ++column) {
