@@ -267,9 +267,11 @@ void DeflateWriter::writeBlock(bool last) {
     std::uint64_t repeated = word;
     for (int i = 1; i < together; ++i) repeated = repeated << count | word;
     std::uint32_t left = token.times;
-    for (; left >= static_cast<std::uint32_t>(together); left -= together)
+    for (; left > static_cast<std::uint32_t>(together); left -= together) {
       put(repeated, together * count);
-    for (; left > 0; --left) put(word, count);
+    }
+    const int rest = static_cast<int>(left) * count;
+    put(repeated & ((std::uint64_t{1} << rest) - 1), rest);
   }
   put(symbols.bits[end_of_block], symbols.length[end_of_block]);
   if (last && pending_count_) put(0, 8 - pending_count_);

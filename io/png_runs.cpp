@@ -240,6 +240,15 @@ void RunDeflater::encodeRow(std::uint32_t y) {
   while (byte < stride_) {
     while (endByte(run) <= byte) ++run;
     while (comparable && endByte(above) <= byte) ++above;
+    const std::uint64_t begin_byte = beginByte(run);
+    const std::uint64_t first_end = begin_byte + unit_;
+    const std::uint64_t rest = byte >= first_end ? endByte(run) - byte : 0;
+    if (rest >= max_match && !open_match_) {
+      const auto times = static_cast<std::uint32_t>(rest / max_match);
+      deflate_.match(DeflateWriter::max_match, static_cast<std::uint32_t>(unit_), times);
+      byte += times * max_match;
+      continue;
+    }
     const std::uint64_t agreeing = comparable ? agreement(byte, run, above) : 0;
     if (open_match_) {
       matchAbove(std::min(agreeing, max_match - open_match_));
@@ -252,15 +261,6 @@ void RunDeflater::encodeRow(std::uint32_t y) {
         deflate_.literal(0);
         ++byte;
       }
-      continue;
-    }
-    const std::uint64_t begin_byte = beginByte(run);
-    const std::uint64_t first_end = begin_byte + unit_;
-    const std::uint64_t rest = byte >= first_end ? endByte(run) - byte : 0;
-    if (rest >= max_match) {
-      const auto times = static_cast<std::uint32_t>(rest / max_match);
-      deflate_.match(max_match, static_cast<std::uint32_t>(unit_), times);
-      byte += times * max_match;
       continue;
     }
     if (rest >= DeflateWriter::min_match && rest >= agreeing) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -36,8 +37,10 @@ StackPreview::StackPreview(const openvdb::Vec3d& pitch_mm, std::uint32_t width,
   const double width_mm = width * pitch_mm.x();
   const double front_mm = layers.size() * pitch_mm.z();
   const double slice_mm = height * pitch_mm.y();
-  pixel_mm_ = std::max(2 * width_mm / (largest_width - 3 * margin - 2),
-                       std::max(front_mm, slice_mm) / (largest_height - 2 * margin - 1));
+  // As large as the picture allows, but a voxel need not be more than eight pixels.
+  pixel_mm_ = std::max({2 * width_mm / (largest_width - 3 * margin - 2),
+                        std::max(front_mm, slice_mm) / (largest_height - 2 * margin - 1),
+                        std::max({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()}) / 8});
   columns_ = pixels(width_mm, pixel_mm_);
   front_rows_ = pixels(front_mm, pixel_mm_);
   slice_rows_ = pixels(slice_mm, pixel_mm_);
@@ -96,6 +99,7 @@ void StackPreview::look(const RunImage& slice, Hit* hits) {
 
 std::vector<StackPreview::Pixel> StackPreview::front() const {
   const int rays = columns_ * fineness;
+  const double step_mm = std::max({pitch_mm_.x(), pitch_mm_.y(), pitch_mm_.z(), pixel_mm_});
   struct Surface {
     float depth_mm = 0;
     float cover = 0;
@@ -105,21 +109,31 @@ std::vector<StackPreview::Pixel> StackPreview::front() const {
   for (int row = 0; row < front_rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
       Surface& pixel = surface[static_cast<std::size_t>(row) * columns_ + column];
+      std::array<Hit, fineness * fineness> hits;
+      float nearest_mm = std::numeric_limits<float>::infinity();
       for (int i = 0; i < fineness * fineness; ++i) {
-        const Hit& hit = hits_[static_cast<std::size_t>(row * fineness + i / fineness) * rays +
-                               column * fineness + i % fineness];
+        hits[i] = hits_[static_cast<std::size_t>(row * fineness + i / fineness) * rays +
+                        column * fineness + i % fineness];
+        if (hits[i].value) nearest_mm = std::min(nearest_mm, hits[i].depth_mm);
+      }
+      // At an outline the rays of a pixel meet surfaces far apart; the nearest gives the slope.
+      float near_rays = 0;
+      for (const Hit& hit : hits) {
         if (!hit.value) continue;
         const std::uint32_t colour = palette_[hit.value];
-        pixel.depth_mm += hit.depth_mm;
         pixel.colour.red += static_cast<float>(colour & 255);
         pixel.colour.green += static_cast<float>(colour >> 8 & 255);
         pixel.colour.blue += static_cast<float>(colour >> 16 & 255);
         pixel.cover += 1;
+        if (hit.depth_mm > nearest_mm + 2 * step_mm) continue;
+        pixel.depth_mm += hit.depth_mm;
+        near_rays += 1;
       }
       if (pixel.cover > 0) {
-        pixel.depth_mm /= pixel.cover;
-        for (float* channel : {&pixel.colour.red, &pixel.colour.green, &pixel.colour.blue})
+        pixel.depth_mm /= near_rays;
+        for (float* channel : {&pixel.colour.red, &pixel.colour.green, &pixel.colour.blue}) {
           *channel /= pixel.cover;
+        }
       }
       pixel.cover /= fineness * fineness;
     }
@@ -127,8 +141,7 @@ std::vector<StackPreview::Pixel> StackPreview::front() const {
 
   // The surface is a staircase of voxels: its slope is that of a plane fitted to the pixels around
   // that belong to it.
-  const double step_mm = std::max({pitch_mm_.x(), pitch_mm_.y(), pitch_mm_.z(), pixel_mm_});
-  const int radius = std::clamp(static_cast<int>(std::ceil(2 * step_mm / pixel_mm_)), 2, 12);
+  const int radius = std::clamp(static_cast<int>(std::ceil(2 * step_mm / pixel_mm_)), 2, 8);
   std::vector<Pixel> result(surface.size());
   tbb::parallel_for(0, front_rows_, [&](int row) {
     for (int column = 0; column < columns_; ++column) {
@@ -142,7 +155,7 @@ std::vector<StackPreview::Pixel> StackPreview::front() const {
              ++u) {
           const Surface& near = surface[static_cast<std::size_t>(row + v) * columns_ + column + u];
           const double depth = near.depth_mm - here.depth_mm;
-          const double distance = std::hypot(u, v);
+          const double distance = std::sqrt(u * u + v * v);
           if (near.cover <= 0 || distance > radius ||
               std::abs(depth) > 4 * pixel_mm_ * distance + 2 * step_mm)
             continue;

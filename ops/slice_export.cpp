@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -19,6 +20,7 @@
 #include "vdbdither/find_grid.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
+#include "vdbdither/version.h"
 
 namespace vdbdither {
 
@@ -329,7 +331,7 @@ class SliceExport : public Sink {
       return entry == schema_.metadata.end() ? std::string() : entry->second;
     };
     ordered_json manifest;
-    manifest["creator"] = metadata("creator");
+    manifest["creator"] = std::string("vdbdither ") + version;
     const ordered_json printer = ordered_json::parse(metadata("vdbdither:printer"), nullptr, false);
     manifest["printer"] = printer.is_discarded() ? ordered_json() : printer;
     manifest["format"] = format_;
@@ -351,7 +353,9 @@ class SliceExport : public Sink {
            {"voxels", voxels_[i + 1]},
            {"ml", static_cast<double>(voxels_[i + 1]) * lattice.pitch_mm.product() / 1000}});
     }
-    manifest["history"] = metadata("vdbdither:history");
+    manifest["history"] = ordered_json::array();
+    std::istringstream history(metadata("vdbdither:history"));
+    for (std::string line; std::getline(history, line);) manifest["history"].push_back(line);
     manifest["slices"] = slices_;
     return manifest.dump(1) + "\n";
   }

@@ -1,7 +1,7 @@
 #include "io/png_runs.h"
 
 #include <cmath>
-#include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <random>
 #include <string>
@@ -10,8 +10,10 @@
 #include <gtest/gtest.h>
 #include <spng.h>
 
+#include "io/staged_output.h"
 #include "tests/support/png_reader.h"
 #include "tests/support/run_images.h"
+#include "tests/support/scratch_folder.h"
 #include "vdbdither/errors.h"
 
 namespace vdbdither {
@@ -164,6 +166,25 @@ TEST(PngRuns, NeighbouringRunsOfOneColourAreOne) {
   expectDecodes(image, {PngPixels::rgba8, palette, 0, 0});
   EXPECT_EQ(encodePng(image, {PngPixels::rgba8, palette, 0, 0}),
             encodePng(runImage(500, 20, [](int, int) { return 7U; }), {}));
+}
+
+TEST(PngRuns, PillowReadsTheSamePixels) {
+  if (std::system("/usr/bin/python3 -c 'import PIL.Image' 2>/dev/null") != 0)
+    GTEST_SKIP() << "no Pillow here";
+  const test::ScratchFolder scratch;
+  const RunImage image = test::ditheredDisc(601, 307, 20, 7);
+  const std::vector<std::uint32_t> greys = {9, 200};
+  for (const PngFormat& format :
+       {PngFormat{PngPixels::rgba8, colours, 0, 0}, PngFormat{PngPixels::grey8, greys, 0, 0},
+        PngFormat{PngPixels::grey1, {}, 0, 0}}) {
+    const std::string png = scratch / "image.png";
+    const std::string raw = scratch / "image.raw";
+    writeFile(png, encodePng(image, format), png);
+    const std::string script =
+        "import PIL.Image as I; open('" + raw + "', 'wb').write(I.open('" + png + "').tobytes())";
+    ASSERT_EQ(std::system(("/usr/bin/python3 -c \"" + script + "\"").c_str()), 0);
+    EXPECT_TRUE(test::fileBytes(raw) == pixelBytes(image, format));
+  }
 }
 
 TEST(PngRuns, PixelSizeIsDotsPerMetre) {

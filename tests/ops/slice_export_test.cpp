@@ -42,7 +42,7 @@ Job jobOf(const openvdb::Int32Grid::Ptr& material, const CoordBBox& box) {
   job.schema.grids["material"] = openvdb::Int32Grid::create(0);
   job.schema.metadata[std::string(materials_key)] =
       toJson({{"white", {240, 240, 240, 255}}, {"black", {26, 26, 29, 255}}});
-  job.schema.metadata["vdbdither:history"] = "drawn";
+  job.schema.metadata["vdbdither:history"] = "drawn\nby hand";
   job.grids["material"] = material;
   return job;
 }
@@ -183,7 +183,7 @@ TEST(SliceExport, ManifestTellsWhatIsThere) {
   EXPECT_EQ(manifest["pitch_mm"], (nlohmann::json{0.042, 0.084, 0.022}));
   EXPECT_EQ(manifest["size"], (nlohmann::json{7, 6, 2}));
   EXPECT_EQ(manifest["first_layer"], 4);
-  EXPECT_EQ(manifest["history"], "drawn");
+  EXPECT_EQ(manifest["history"], (nlohmann::json{"drawn", "by hand"}));
   EXPECT_EQ(manifest["materials"][0]["name"], "white");
   EXPECT_EQ(manifest["materials"][0]["voxels"], 3);
   EXPECT_EQ(manifest["materials"][1]["voxels"], 2);
@@ -210,8 +210,8 @@ TEST(SliceExport, PreviewFitsAScreenAndShowsEveryMaterial) {
     white += image.rows[i] == 240 && image.rows[i + 2] == 240;
     black += image.rows[i] == 26 && image.rows[i + 2] == 29;
   }
-  EXPECT_GT(white, 10000);
-  EXPECT_GT(black, 10000);
+  EXPECT_GT(white, 1000);
+  EXPECT_GT(black, 1000);
 }
 
 TEST(SliceExport, SlabHeightsAndThreadsGiveTheSameFiles) {
