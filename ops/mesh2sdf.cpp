@@ -80,8 +80,10 @@ class MeshToSdf : public Source {
     options.flag("place", place_,
                  "Puts the mesh on the bed: its bounding box begins at the origin");
     options.integer("refine-y", refine_y_, 1, 16, "Voxels in place of one along y");
-    options.length("band", band_mm_,
-                   "How far from the surface distances are kept; 0: two voxel diagonals");
+    options.text(
+        "band", band_text_, "N|MM",
+        "How far from the surface distances are kept: in voxel diameters along the normal, or "
+        "with a unit as a length");
     options.flag("normals", extras_.normals, "Adds the grid 'N', exact unit outward normals");
     options.flag("closest", extras_.closest,
                  "Adds the grid 'closest', the index of the nearest triangle");
@@ -90,10 +92,10 @@ class MeshToSdf : public Source {
   Schema plan() override {
     Schema schema;
     const Vec3d pitch_mm = pitchMm(schema);
+    band_ = bandFrom(band_text_);
     auto mesh = std::make_shared<Mesh>(readMeshes());
     placeMesh(*mesh);
     schema.lattice = latticeAround(*mesh, pitch_mm);
-    band_.mm = band_mm_ > 0 ? band_mm_ : 2 * schema.lattice.diagonalMm();
     const Lattice& lattice = schema.lattice;
     schema.leaves_per_row = leavesPerRow(*mesh, lattice);
     field_ = std::make_unique<MeshDistance>(std::move(mesh), lattice, band_, extras_);
@@ -126,6 +128,13 @@ class MeshToSdf : public Source {
       begin = comma + 1;
     }
     return pitch_mm;
+  }
+
+  static Band bandFrom(const std::string& text) {
+    const bool diameters = text.find_first_not_of("0123456789.") == std::string::npos;
+    const double size = parseLengthMm(text);
+    if (!(size > 0)) throw UsageError("--band: '" + text + "' is not above zero");
+    return diameters ? Band{size, 0} : Band{0, size};
   }
 
   Mesh readMeshes() const {
@@ -187,6 +196,7 @@ class MeshToSdf : public Source {
     const auto rows = static_cast<std::size_t>(lattice.layers().size() / leaf_layers + 2);
     const double low = lattice.layers().begin * lattice.pitch_mm.z();
     std::vector<double> leaves(rows + 1, 0.0);
+    const double band_mm = band_.greatestMm(lattice.pitch_mm);
     for (const Mesh::Triangle& t : mesh.triangles) {
       const Vec3d& a = mesh.vertices[t[0]];
       const Vec3d& b = mesh.vertices[t[1]];
@@ -196,12 +206,12 @@ class MeshToSdf : public Source {
       // normal.
       const double across = std::abs(area.x()) * leaf_mm.x() + std::abs(area.y()) * leaf_mm.y() +
                             std::abs(area.z()) * leaf_mm.z();
-      const double touched = (2 * band_.mm * area.length() + across) / leaf_mm.product();
+      const double touched = (2 * band_mm * area.length() + across) / leaf_mm.product();
       const auto [z_low, z_high] = std::minmax({a.z(), b.z(), c.z()});
       const auto first = static_cast<std::size_t>(
-          std::clamp((z_low - band_.mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
+          std::clamp((z_low - band_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
       const auto last = static_cast<std::size_t>(
-          std::clamp((z_high + band_.mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
+          std::clamp((z_high + band_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
       for (std::size_t row = first; row <= last; ++row)
         leaves[row] += touched / static_cast<double>(last - first + 1);
     }
@@ -224,7 +234,7 @@ class MeshToSdf : public Source {
   Vec3d rotate_{0, 0, 0};
   bool place_ = false;
   int refine_y_ = 1;
-  double band_mm_ = 0;
+  std::string band_text_ = "1";
   DistanceExtras extras_;
 
   Band band_;

@@ -6,8 +6,9 @@
 #include "ops/kernels/mesh_distance.h"
 
 #include <algorithm>
-#include <bit>
+#include <atomic>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -15,7 +16,7 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/feature_sweep.h"
+#include "ops/kernels/leaf_distances.h"
 #include "ops/kernels/row_crossings.h"
 
 namespace vdbdither {
@@ -29,10 +30,11 @@ namespace {
 constexpr int edge = leaf_layers;
 constexpr std::size_t features_per_task = 512;
 
+/// A chunk with more features than this is split along y, which bounds what it holds of them.
+constexpr std::size_t features_per_chunk = 1 << 17;
+
 /// Closer than this the direction to the nearest point says nothing about the normal.
 constexpr double on_surface_mm = 1e-6;
-
-int floorDiv8(int i) { return i >> 3; }
 
 /// The items of every leaf of a chunk, in the order in which they were entered.
 class LeafBins {
@@ -41,16 +43,23 @@ class LeafBins {
     std::uint32_t leaf, item;
   };
 
-  LeafBins(std::size_t leaves, const std::vector<std::vector<Entry>>& parts)
+  template <class Task>
+  LeafBins(std::size_t leaves, const std::vector<Task>& tasks, std::vector<Entry> Task::*entries)
       : first_(leaves + 1, 0) {
-    for (const auto& part : parts)
-      for (const Entry& entry : part) ++first_[entry.leaf + 1];
+    for (const Task& task : tasks)
+      for (const Entry& entry : task.*entries) ++first_[entry.leaf + 1];
     for (std::size_t leaf = 0; leaf < leaves; ++leaf) first_[leaf + 1] += first_[leaf];
     items_.resize(first_.back());
-    for (const auto& part : parts)
-      for (const Entry& entry : part) items_[first_[entry.leaf]++] = entry.item;
+    for (const Task& task : tasks)
+      for (const Entry& entry : task.*entries) items_[first_[entry.leaf]++] = entry.item;
     std::copy_backward(first_.begin(), first_.end() - 1, first_.end());
     first_[0] = 0;
+  }
+  LeafBins() = default;
+
+  /// How many items the leaves [begin, end) hold.
+  [[nodiscard]] std::size_t count(std::size_t begin, std::size_t end) const {
+    return first_[end] - first_[begin];
   }
 
   [[nodiscard]] std::span<const std::uint32_t> of(std::size_t leaf) const {
@@ -62,43 +71,69 @@ class LeafBins {
   std::vector<std::uint32_t> items_;
 };
 
-/// Eight planes of constant x, bit 8·j + k in each: OpenVDB's own order of a leaf.
-using LeafBits = std::array<std::uint64_t, edge>;
-
 /// The winding numbers of the 64 rows of a row of leaves, swept along x.
 class RowWinding {
  public:
   static std::uint32_t pack(const Coord& ijk, int delta) {
     return static_cast<std::uint32_t>(
-        ((ijk.x() & 7) << 6 | (ijk.y() & 7) << 3 | (ijk.z() & 7)) << 1 | (delta > 0));
+        ((ijk.x() & 7) << 6 | (ijk.y() & 7) << 3 | (ijk.z() & 7)) << 1 | (delta > 0 ? 1 : 0));
   }
+
+  /// The inside of the last plane.
+  [[nodiscard]] std::uint64_t bits() const { return bits_; }
 
   /// The inside of the next leaf, whose crossings were packed.
   LeafBits advance(std::span<const std::uint32_t> crossings) {
     LeafBits inside;
-    if (crossings.empty()) {
-      inside.fill(bits_);
-      return inside;
-    }
-    std::array<std::array<std::int16_t, 64>, edge> steps{};
-    for (const std::uint32_t crossing : crossings)
-      steps[crossing >> 7][(crossing >> 1) & 63] = static_cast<std::int16_t>(
-          steps[crossing >> 7][(crossing >> 1) & 63] + ((crossing & 1) ? 1 : -1));
-    for (std::size_t x = 0; x < edge; ++x) {
-      std::uint64_t bits = 0;
-      for (std::size_t row = 0; row < 64; ++row) {
-        winding_[row] = static_cast<std::int16_t>(winding_[row] + steps[x][row]);
-        bits |= static_cast<std::uint64_t>(winding_[row] != 0) << row;
+    inside.fill(bits_);
+    if (crossings.empty()) return inside;
+    // Rows of a plane that enter and leave; the few that do so more than once wait in `again`.
+    std::array<LeafBits, 2> once{};
+    std::vector<std::uint32_t> again;
+    for (const std::uint32_t crossing : crossings) {
+      const std::uint32_t plane = crossing >> 7;
+      const std::uint64_t row = 1ULL << ((crossing >> 1) & 63);
+      if (once[~crossing & 1][plane] & row) {
+        once[~crossing & 1][plane] ^= row;
+      } else if (once[crossing & 1][plane] & row) {
+        again.push_back(crossing);
+      } else {
+        once[crossing & 1][plane] |= row;
       }
-      inside[x] = bits;
     }
-    bits_ = inside[edge - 1];
+    for (std::size_t plane = 0; plane < edge; ++plane) {
+      lower(once[0][plane]);
+      raise(once[1][plane]);
+      for (const std::uint32_t crossing : again) {
+        if (crossing >> 7 != plane) continue;
+        const std::uint64_t row = 1ULL << ((crossing >> 1) & 63);
+        (crossing & 1) ? raise(row) : lower(row);
+      }
+      bits_ = 0;
+      for (const std::uint64_t digit : digits_) bits_ |= digit;
+      inside[plane] = bits_;
+    }
     return inside;
   }
 
  private:
-  std::array<std::int16_t, 64> winding_{};
-  std::uint64_t bits_ = 0;
+  void raise(std::uint64_t rows) {
+    for (std::uint64_t& digit : digits_) {
+      if (rows == 0) break;
+      digit ^= rows;
+      rows &= ~digit;
+    }
+  }
+  void lower(std::uint64_t rows) {
+    for (std::uint64_t& digit : digits_) {
+      if (rows == 0) break;
+      digit ^= rows;
+      rows &= digit;
+    }
+  }
+
+  std::array<std::uint64_t, 16> digits_{};  ///< of the 64 numbers, in two's complement
+  std::uint64_t bits_ = 0;                  ///< those that are not zero
 };
 
 openvdb::math::Transform::Ptr transformOf(const Lattice& lattice) {
@@ -137,61 +172,44 @@ class TileWriter {
   Parent* parent_ = nullptr;
 };
 
-/// Calls visit(leaf) for the leaves of `leaves` (leaf coordinates) that the region of `feature`
-/// within `band_mm` touches; a few that it does not touch may be among them.
+/// The bounds of a feature, and two caps for each distance form.
+constexpr std::size_t most_limits = MeshFeature::max_bounds + 6;
+
+/// Calls visit(leaf) with the leaf coordinates of those leaves that overlap `reach` and meet every
+/// one of the half-spaces `limits` (functions of voxel indices) on their own; that is nearly those
+/// that meet all at once.
 template <class Visit>
-void visitLeaves(const MeshFeature& feature, double band_mm, const Vec3d& pitch_mm,
-                 const CoordBBox& voxels, const Visit& visit) {
-  const Vec3d low = (feature.min - feature.below * band_mm) / pitch_mm;
-  const Vec3d high = (feature.max + feature.above * band_mm) / pitch_mm;
-  Coord first, last;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double from = std::max(std::floor(low[axis]), static_cast<double>(voxels.min()[axis]));
-    const double to = std::min(std::ceil(high[axis]), static_cast<double>(voxels.max()[axis]));
-    if (!(from <= to)) return;
-    first[axis] = floorDiv8(static_cast<int>(from));
-    last[axis] = floorDiv8(static_cast<int>(to));
-  }
+void visitLeaves(std::span<const LinearForm> limits, const CoordBBox& reach, const Visit& visit) {
+  const Coord first = reach.min() >> 3;
+  const Coord last = reach.max() >> 3;
   if (first == last) {
     visit(first);
     return;
   }
-  // The bounds, and the caps that the band sets on the distance to the plane or line, in voxels.
-  constexpr std::size_t max_limits = MeshFeature::max_bounds + 4;
-  std::array<LinearForm, max_limits> limits;
-  std::size_t count = 0;
-  const auto add = [&](const LinearForm& form) {
-    limits[count++] = {form.gradient * pitch_mm, form.constant};
-  };
-  for (int f = feature.rank; f < feature.rank + feature.bounds; ++f)
-    add(feature.forms[static_cast<std::size_t>(f)]);
-  for (int f = 0; f < feature.rank && feature.rank < 3; ++f) {
-    const LinearForm& form = feature.forms[static_cast<std::size_t>(f)];
-    add({form.gradient, form.constant + band_mm});
-    add({-form.gradient, -form.constant + band_mm});
-  }
   const auto best = [](double slope, int leaf) {
     return std::max(slope * (leaf * edge), slope * (leaf * edge + edge - 1));
   };
+  std::array<double, most_limits> leaves_per_unit;
+  for (std::size_t l = 0; l < limits.size(); ++l)
+    leaves_per_unit[l] = -1 / (limits[l].gradient.x() * edge);
   for (int z = first.z(); z <= last.z(); ++z) {
     for (int y = first.y(); y <= last.y(); ++y) {
       double x_low = first.x();
       double x_high = last.x();
-      for (std::size_t l = 0; l < count; ++l) {
+      for (std::size_t l = 0; l < limits.size(); ++l) {
         const Vec3d& g = limits[l].gradient;
         const double rest = limits[l].constant + best(g.y(), y) + best(g.z(), z);
         if (g.x() > 0) {
-          x_low = std::max(x_low, (-rest / g.x() - (edge - 1)) / edge);
+          x_low = std::max(x_low, rest * leaves_per_unit[l] - (edge - 1.0) / edge);
         } else if (g.x() < 0) {
-          x_high = std::min(x_high, -rest / g.x() / edge);
+          x_high = std::min(x_high, rest * leaves_per_unit[l]);
         } else if (rest < 0) {
-          x_high = x_low - 1;
+          x_high = -std::numeric_limits<double>::infinity();
         }
       }
       if (!(x_low <= x_high)) continue;
-      for (int x = static_cast<int>(std::ceil(x_low)); x <= static_cast<int>(std::floor(x_high));
-           ++x)
-        visit(Coord(x, y, z));
+      const int end = static_cast<int>(std::floor(x_high));
+      for (int x = static_cast<int>(std::ceil(x_low)); x <= end; ++x) visit(Coord(x, y, z));
     }
   }
 }
@@ -201,8 +219,10 @@ void visitLeaves(const MeshFeature& feature, double band_mm, const Vec3d& pitch_
 /// A few rows of leaves: binned, swept and handed over.
 class MeshDistance::Chunk {
  public:
-  /// `voxels`: the voxels that exist.
-  Chunk(const MeshDistance& field, const CoordBBox& voxels);
+  /// `voxels`: those that exist. `features`: positions of those that may reach them, in rising
+  /// order.
+  Chunk(const MeshDistance& field, const CoordBBox& voxels,
+        std::span<const std::uint32_t> features);
 
   void appendTo(DistanceGrids& grids);
 
@@ -216,6 +236,13 @@ class MeshDistance::Chunk {
     std::vector<Leaf> leaves;
     std::vector<Coord> interior;  ///< origins of the leaves that are wholly inside
   };
+  /// What a task of `features_per_task` features leaves behind.
+  struct Task {
+    std::vector<LatticeFeature> features;  ///< their forms are offsets until all are in place
+    std::vector<LinearForm> forms;
+    std::vector<LeafBins::Entry> entries;
+    std::vector<LeafBins::Entry> crossings;
+  };
 
   [[nodiscard]] std::uint32_t indexOf(const Coord& leaf) const {
     const Coord at = leaf - leaves_.min();
@@ -223,26 +250,49 @@ class MeshDistance::Chunk {
                                       at.x());
   }
   [[nodiscard]] LeafBits existing(const Coord& origin) const;
-  void enter();
+  [[nodiscard]] CoordBBox reachOf(const MeshFeature& feature, double band_mm) const;
+  void describe(Task& task, std::size_t begin, std::size_t end);
+  void markBand(std::uint32_t triangle);
+  void enter(Task& task, std::size_t begin) const;
   void sweepRow(int y, int z, Row& row) const;
-  void makeLeaf(const Coord& origin, std::span<const std::uint32_t> features,
+  void makeLeaf(const Coord& leaf_index, std::span<const std::uint32_t> features,
                 const LeafBits& inside, Row& row) const;
-  void nearest(const Coord& origin, std::span<const std::uint32_t> features,
-               LeafDistances& distances) const;
-  void extras(Leaf& leaf, std::span<const std::uint32_t> features,
-              const LeafDistances& distances) const;
+  void addExtras(Leaf& leaf, const LeafDistances& distances) const;
 
   const MeshDistance& field_;
   CoordBBox voxels_;
   CoordBBox leaves_;
+  std::span<const std::uint32_t> positions_;
+  double greatest_mm_;
+  std::vector<Task> tasks_;
+  std::vector<std::atomic<float>> bands_mm_;  ///< of every leaf; empty where it is the same for all
+  LeafBins features_;
+  LeafBins crossings_;
   std::vector<Row> rows_;
-  LeafBins features_{0, {}};
-  LeafBins crossings_{0, {}};
 };
 
-MeshDistance::Chunk::Chunk(const MeshDistance& field, const CoordBBox& voxels)
-    : field_(field), voxels_(voxels), leaves_(voxels.min() >> 3, voxels.max() >> 3) {
-  enter();
+MeshDistance::Chunk::Chunk(const MeshDistance& field, const CoordBBox& voxels,
+                           std::span<const std::uint32_t> features)
+    : field_(field),
+      voxels_(voxels),
+      leaves_(voxels.min() >> 3, voxels.max() >> 3),
+      positions_(features),
+      greatest_mm_(field.backgroundMm()),
+      tasks_((features.size() + features_per_task - 1) / features_per_task) {
+  const auto leaf_count = static_cast<std::size_t>(leaves_.volume());
+  if (!(field_.band_.mm > 0)) bands_mm_ = std::vector<std::atomic<float>>(leaf_count);
+
+  const auto forEachTask = [&](const auto& work) {
+    tbb::parallel_for(std::size_t{0}, tasks_.size(), [&](std::size_t i) {
+      const std::size_t begin = i * features_per_task;
+      work(tasks_[i], begin, std::min(begin + features_per_task, positions_.size()));
+    });
+  };
+  forEachTask([&](Task& task, std::size_t begin, std::size_t end) { describe(task, begin, end); });
+  forEachTask([&](Task& task, std::size_t begin, std::size_t) { enter(task, begin); });
+  features_ = LeafBins(leaf_count, tasks_, &Task::entries);
+  crossings_ = LeafBins(leaf_count, tasks_, &Task::crossings);
+
   const int height = leaves_.dim().y();
   rows_.resize(static_cast<std::size_t>(height) * static_cast<std::size_t>(leaves_.dim().z()));
   tbb::parallel_for(std::size_t{0}, rows_.size(), [&](std::size_t row) {
@@ -251,192 +301,223 @@ MeshDistance::Chunk::Chunk(const MeshDistance& field, const CoordBBox& voxels)
   });
 }
 
-void MeshDistance::Chunk::enter() {
+/// The voxels within the bounding box of the feature's region; empty where there are none.
+CoordBBox MeshDistance::Chunk::reachOf(const MeshFeature& feature, double band_mm) const {
   const Vec3d& pitch_mm = field_.lattice_.pitch_mm;
-  std::vector<std::uint32_t> found;
-  field_.features_.collect(voxels_.min().z() * pitch_mm.z() - field_.band_.mm,
-                           voxels_.max().z() * pitch_mm.z() + field_.band_.mm, found);
-  const std::size_t tasks = (found.size() + features_per_task - 1) / features_per_task;
-  std::vector<std::vector<LeafBins::Entry>> features(tasks);
-  std::vector<std::vector<LeafBins::Entry>> crossings(tasks);
-  tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
-    const std::size_t end = std::min((task + 1) * features_per_task, found.size());
-    for (std::size_t i = task * features_per_task; i < end; ++i) {
-      const MeshFeatures::Id id = field_.features_.id(found[i]);
-      const MeshFeature feature = field_.features_.describe(id);
-      if (feature.rank > 0) {
-        visitLeaves(feature, field_.band_.mm, pitch_mm, voxels_, [&](const Coord& leaf) {
-          features[task].push_back({indexOf(leaf), found[i]});
-        });
-      }
-      if (id.kind() == MeshFeatures::Kind::face) {
-        visitRowCrossings(
-            {field_.features_.corner(id.index(), 0), field_.features_.corner(id.index(), 1),
-             field_.features_.corner(id.index(), 2)},
-            pitch_mm, voxels_, [&](const Coord& ijk, int delta) {
-              crossings[task].push_back({indexOf(ijk >> 3), RowWinding::pack(ijk, delta)});
-            });
-      }
+  const Vec3d low = (feature.min - feature.below * band_mm) / pitch_mm;
+  const Vec3d high = (feature.max + feature.above * band_mm) / pitch_mm;
+  CoordBBox reach;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double from = std::max(std::floor(low[axis]), static_cast<double>(voxels_.min()[axis]));
+    const double to = std::min(std::ceil(high[axis]), static_cast<double>(voxels_.max()[axis]));
+    if (!(from <= to)) return {};
+    reach.min()[axis] = static_cast<int>(from);
+    reach.max()[axis] = static_cast<int>(to);
+  }
+  return reach;
+}
+
+void MeshDistance::Chunk::describe(Task& task, std::size_t begin, std::size_t end) {
+  const MeshFeatures& all = field_.features_;
+  const Vec3d& pitch_mm = field_.lattice_.pitch_mm;
+  const double low = voxels_.min().z() * pitch_mm.z() - greatest_mm_;
+  const double high = voxels_.max().z() * pitch_mm.z() + greatest_mm_;
+  constexpr std::size_t usual_forms = 6;
+  task.features.reserve(end - begin);
+  task.forms.reserve((end - begin) * usual_forms);
+  std::vector<std::size_t> first_forms;
+  first_forms.reserve(end - begin);
+  for (std::size_t i = begin; i < end; ++i) {
+    const MeshFeatures::Id id = all.id(positions_[i]);
+    const bool face = id.kind() == MeshFeatures::Kind::face;
+    first_forms.push_back(task.forms.size());
+    if (face && !bands_mm_.empty()) markBand(id.index());
+    if (!all.meets(positions_[i], 2, low, high)) {
+      task.features.push_back({});
+      continue;
+    }
+    const MeshFeature feature = all.describe(id);
+    for (int f = 0; f < feature.rank + feature.bounds; ++f) {
+      const LinearForm& form = feature.forms[static_cast<std::size_t>(f)];
+      task.forms.push_back({form.gradient * pitch_mm, form.constant});
+    }
+    task.features.push_back({nullptr, feature.rank, feature.rank + feature.bounds, greatest_mm_,
+                             reachOf(feature, greatest_mm_)});
+    if (face) {
+      visitRowCrossings(
+          {all.corner(id.index(), 0), all.corner(id.index(), 1), all.corner(id.index(), 2)},
+          pitch_mm, voxels_, [&](const Coord& ijk, int delta) {
+            task.crossings.push_back({indexOf(ijk >> 3), RowWinding::pack(ijk, delta)});
+          });
+    }
+  }
+  for (std::size_t i = 0; i < task.features.size(); ++i)
+    task.features[i].forms = task.forms.data() + first_forms[i];
+}
+
+/// A voxel is decided by the normal at its closest surface voxel. That lies at most a band and a
+/// voxel diagonal away, and the surface at most another band from there.
+void MeshDistance::Chunk::markBand(std::uint32_t triangle) {
+  const Vec3d& pitch_mm = field_.lattice_.pitch_mm;
+  const MeshFeatures& all = field_.features_;
+  const float band_mm = field_.triangle_band_mm_[triangle];
+  const double around_mm = 2 * band_mm + pitch_mm.length();
+  MeshFeature wide;
+  wide.min = openvdb::math::minComponent(
+      openvdb::math::minComponent(all.corner(triangle, 0), all.corner(triangle, 1)),
+      all.corner(triangle, 2));
+  wide.max = openvdb::math::maxComponent(
+      openvdb::math::maxComponent(all.corner(triangle, 0), all.corner(triangle, 1)),
+      all.corner(triangle, 2));
+  wide.below = wide.above = Vec3d(1, 1, 1);
+  const CoordBBox reach = reachOf(wide, around_mm);
+  if (reach.empty()) return;
+  const Vec3d& n = all.normal(triangle);
+  const double offset = n.dot(all.corner(triangle, 0));
+  const std::array<LinearForm, 2> caps{LinearForm{n * pitch_mm, around_mm - offset},
+                                       LinearForm{-n * pitch_mm, around_mm + offset}};
+  visitLeaves(caps, reach, [&](const Coord& leaf) {
+    std::atomic<float>& band = bands_mm_[indexOf(leaf)];
+    float present = band.load(std::memory_order_relaxed);
+    while (present < band_mm &&
+           !band.compare_exchange_weak(present, band_mm, std::memory_order_relaxed)) {
     }
   });
-  const auto leaves = static_cast<std::size_t>(leaves_.volume());
-  features_ = LeafBins(leaves, features);
-  crossings_ = LeafBins(leaves, crossings);
+}
+
+void MeshDistance::Chunk::enter(Task& task, std::size_t begin) const {
+  for (std::size_t i = 0; i < task.features.size(); ++i) {
+    const LatticeFeature& feature = task.features[i];
+    if (feature.rank == 0 || feature.reach.empty()) continue;
+    const std::span forms(feature.forms, static_cast<std::size_t>(feature.count));
+    const auto rank = static_cast<std::size_t>(feature.rank);
+    std::array<LinearForm, most_limits> limits;
+    auto end = std::copy(forms.begin() + feature.rank, forms.end(), limits.begin());
+    for (const LinearForm& form : forms.first(rank)) {
+      *end++ = {form.gradient, form.constant + greatest_mm_};
+      *end++ = {-form.gradient, greatest_mm_ - form.constant};
+    }
+    const auto reaches = [&](const Coord& leaf, double band_mm) {
+      const Vec3d centre = (leaf << 3).asVec3d() + Vec3d(0.5 * (edge - 1));
+      return std::all_of(forms.begin(), forms.begin() + feature.rank, [&](const LinearForm& form) {
+        const Vec3d& g = form.gradient;
+        const double half =
+            (std::abs(g.x()) + std::abs(g.y()) + std::abs(g.z())) * 0.5 * (edge - 1);
+        return std::abs(form.at(centre)) <= band_mm + half;
+      });
+    };
+    visitLeaves(std::span(limits.begin(), end), feature.reach, [&](const Coord& leaf) {
+      const std::uint32_t index = indexOf(leaf);
+      if (bands_mm_.empty() || reaches(leaf, bands_mm_[index]))
+        task.entries.push_back({index, static_cast<std::uint32_t>(begin + i)});
+    });
+  }
 }
 
 LeafBits MeshDistance::Chunk::existing(const Coord& origin) const {
-  std::uint64_t plane = 0;
-  for (int j = 0; j < edge; ++j)
-    for (int k = 0; k < edge; ++k)
-      if (voxels_.isInside(Coord(voxels_.min().x(), origin.y() + j, origin.z() + k)))
-        plane |= 1ULL << (edge * j + k);
   LeafBits bits;
-  for (int i = 0; i < edge; ++i) {
-    const int x = origin.x() + i;
-    bits[static_cast<std::size_t>(i)] =
-        x >= voxels_.min().x() && x <= voxels_.max().x() ? plane : 0;
+  bits.fill(~0ULL);
+  if (voxels_.isInside(CoordBBox::createCube(origin, edge))) return bits;
+  bits.fill(0);
+  for (const Coord& ijk : CoordBBox::createCube(origin, edge)) {
+    const Coord at = ijk - origin;
+    if (voxels_.isInside(ijk))
+      bits[static_cast<std::size_t>(at.x())] |= 1ULL << (edge * at.y() + at.z());
   }
   return bits;
 }
 
 void MeshDistance::Chunk::sweepRow(int y, int z, Row& row) const {
-  const std::uint64_t all = ~0ULL;
+  const std::uint32_t begin = indexOf({leaves_.min().x(), y, z});
+  const std::uint32_t end = begin + static_cast<std::uint32_t>(leaves_.dim().x());
+  if (features_.count(begin, end) + crossings_.count(begin, end) == 0) return;
   RowWinding winding;
-  for (int x = leaves_.min().x(); x <= leaves_.max().x(); ++x) {
-    const Coord leaf(x, y, z);
-    const std::uint32_t index = indexOf(leaf);
+  for (std::uint32_t index = begin; index < end; ++index) {
     const std::span<const std::uint32_t> features = features_.of(index);
-    LeafBits inside = winding.advance(crossings_.of(index));
-    const auto is = [&](std::uint64_t plane) {
-      return std::all_of(inside.begin(), inside.end(),
-                         [plane](std::uint64_t bits) { return bits == plane; });
-    };
-    if (features.empty() && is(0)) continue;
-    const Coord origin = leaf << 3;
-    if (features.empty() && is(all) && voxels_.isInside(origin) &&
-        voxels_.isInside(origin.offsetBy(edge - 1))) {
-      row.interior.push_back(origin);
-      continue;
+    const std::span<const std::uint32_t> crossings = crossings_.of(index);
+    const bool crossed = !features.empty() || !crossings.empty();
+    if (!crossed && winding.bits() == 0) continue;
+    const Coord leaf(leaves_.min().x() + static_cast<int>(index - begin), y, z);
+    const CoordBBox box = CoordBBox::createCube(leaf << 3, edge);
+    if (!crossed && winding.bits() == ~0ULL && voxels_.isInside(box)) {
+      row.interior.push_back(box.min());
+    } else {
+      makeLeaf(leaf, features, winding.advance(crossings), row);
     }
-    makeLeaf(origin, features, inside, row);
   }
 }
 
-void MeshDistance::Chunk::nearest(const Coord& origin, std::span<const std::uint32_t> features,
-                                  LeafDistances& distances) const {
-  const bool track = field_.extras_.normals || field_.extras_.closest;
-  static const std::array<FeatureSweep, 2> sweeps{featureSweep(false), featureSweep(true)};
-  const Vec3d& pitch_mm = field_.lattice_.pitch_mm;
-  const Vec3d corner = origin.asVec3d() * pitch_mm;
-  std::fill_n(distances.squared, LeafDistances::voxels, field_.band_.mm * field_.band_.mm);
-  for (const std::uint32_t position : features) {
-    const MeshFeature feature = field_.features_.describe(field_.features_.id(position));
-    LeafFeature local;
-    local.rank = feature.rank;
-    local.forms = feature.rank + feature.bounds;
-    for (int f = 0; f < local.forms; ++f) {
-      const LinearForm& form = feature.forms[static_cast<std::size_t>(f)];
-      local.x[f] = form.gradient.x() * pitch_mm.x();
-      local.y[f] = form.gradient.y() * pitch_mm.y();
-      local.z[f] = form.gradient.z() * pitch_mm.z();
-      local.constant[f] = form.at(corner);
-    }
-    const Vec3d low = (feature.min - feature.below * field_.band_.mm - corner) / pitch_mm;
-    const Vec3d high = (feature.max + feature.above * field_.band_.mm - corner) / pitch_mm;
-    const auto begin = [](double from) {
-      return static_cast<int>(std::clamp(std::floor(from), 0.0, 8.0));
-    };
-    const auto end = [](double to) {
-      return static_cast<int>(std::clamp(std::ceil(to) + 1, 0.0, 8.0));
-    };
-    local.i_begin = begin(low.x());
-    local.i_end = end(high.x());
-    local.j_begin = begin(low.y());
-    local.j_end = end(high.y());
-    sweeps[track](local, position, distances);
-  }
-}
-
-void MeshDistance::Chunk::makeLeaf(const Coord& origin, std::span<const std::uint32_t> features,
+void MeshDistance::Chunk::makeLeaf(const Coord& leaf_index, std::span<const std::uint32_t> features,
                                    const LeafBits& inside, Row& row) const {
-  const double limit = field_.band_.mm * field_.band_.mm;
-  const auto background = static_cast<float>(field_.band_.mm);
-  alignas(64) LeafDistances distances;
-  nearest(origin, features, distances);
+  const Coord origin = leaf_index << 3;
+  const bool track = field_.extras_.normals || field_.extras_.closest;
+  const double band_mm = bands_mm_.empty() ? greatest_mm_ : double{bands_mm_[indexOf(leaf_index)]};
+  const LeafKernels& kernels = leafKernels();
+
+  LeafDistances distances;
+  std::fill_n(distances.squared, LeafDistances::voxels, std::numeric_limits<double>::infinity());
+  for (const std::uint32_t i : features) {
+    LatticeFeature feature = tasks_[i / features_per_task].features[i % features_per_task];
+    feature.band_mm = band_mm;
+    kernels.lower(feature, origin, i, track, distances);
+  }
 
   const LeafBits exists = existing(origin);
-  Leaf leaf;
-  leaf.surface.reset(newLeaf<openvdb::FloatTree>(origin, background));
-  float* values = leaf.surface->buffer().data();
-  bool any_active = false;
+  LeafBits within;
   bool any_inside = false;
   bool any_outside = false;
   for (std::size_t plane = 0; plane < edge; ++plane) {
-    const std::uint64_t within = inside[plane] & exists[plane];
-    std::uint64_t active = 0;
-    for (std::size_t v = 0; v < 64; ++v) {
-      const double squared = distances.squared[64 * plane + v];
-      const auto distance = static_cast<float>(std::sqrt(squared));
-      const bool is_active = squared < limit && (exists[plane] >> v & 1);
-      const float magnitude = is_active ? distance : background;
-      values[64 * plane + v] = (within >> v & 1) ? 0 - magnitude : magnitude;
-      active |= static_cast<std::uint64_t>(is_active) << v;
-    }
-    leaf.surface->getValueMask().getWord<std::uint64_t>(static_cast<openvdb::Index>(plane)) =
-        active;
-    any_active |= active != 0;
-    any_inside |= within != 0;
-    any_outside |= within != ~0ULL;
+    within[plane] = inside[plane] & exists[plane];
+    any_inside |= within[plane] != 0;
+    any_outside |= within[plane] != ~0ULL;
   }
+  Leaf leaf;
+  leaf.surface.reset(newLeaf<openvdb::FloatTree>(origin, 0));
+  const LeafBits active =
+      kernels.finish(distances, within, exists, band_mm, static_cast<float>(greatest_mm_),
+                     leaf.surface->buffer().data());
+  const bool any_active =
+      std::any_of(active.begin(), active.end(), [](std::uint64_t bits) { return bits != 0; });
   if (!any_active && !any_inside) return;
   if (!any_active && !any_outside) {
     row.interior.push_back(origin);
     return;
   }
-  if (any_active && (field_.extras_.normals || field_.extras_.closest))
-    extras(leaf, features, distances);
+  for (std::size_t plane = 0; plane < edge; ++plane)
+    leaf.surface->getValueMask().getWord<std::uint64_t>(static_cast<openvdb::Index>(plane)) =
+        active[plane];
+  if (any_active && track) addExtras(leaf, distances);
   row.leaves.push_back(std::move(leaf));
 }
 
-void MeshDistance::Chunk::extras(Leaf& leaf, std::span<const std::uint32_t> features,
-                                 const LeafDistances& distances) const {
+void MeshDistance::Chunk::addExtras(Leaf& leaf, const LeafDistances& distances) const {
   const MeshFeatures& all = field_.features_;
-  std::vector<MeshFeature> described;
-  for (const std::uint32_t position : features) described.push_back(all.describe(all.id(position)));
+  const Vec3d& pitch_mm = field_.lattice_.pitch_mm;
+  const auto give = [&](auto& extra, auto* made, const auto& background) {
+    extra.reset(made);
+    std::fill_n(made->buffer().data(), LeafDistances::voxels, background);
+    made->getValueMask() = leaf.surface->getValueMask();
+  };
   const Coord origin = leaf.surface->origin();
+  const openvdb::Vec3s no_normal(0, 0, 0);
   if (field_.extras_.normals)
-    leaf.normals.reset(newLeaf<openvdb::Vec3STree>(origin, openvdb::Vec3s(0, 0, 0)));
-  if (field_.extras_.closest) leaf.closest.reset(newLeaf<openvdb::Int32Tree>(origin, -1));
-  if (leaf.normals) {
-    std::fill_n(leaf.normals->buffer().data(), LeafDistances::voxels, openvdb::Vec3s(0, 0, 0));
-    leaf.normals->getValueMask() = leaf.surface->getValueMask();
-  }
-  if (leaf.closest) {
-    std::fill_n(leaf.closest->buffer().data(), LeafDistances::voxels, -1);
-    leaf.closest->getValueMask() = leaf.surface->getValueMask();
-  }
+    give(leaf.normals, newLeaf<openvdb::Vec3STree>(origin, no_normal), no_normal);
+  if (field_.extras_.closest) give(leaf.closest, newLeaf<openvdb::Int32Tree>(origin, -1), -1);
+
   for (auto it = leaf.surface->cbeginValueOn(); it; ++it) {
     const openvdb::Index v = it.pos();
-    const auto position = static_cast<std::uint32_t>(distances.nearest[v]);
-    const MeshFeatures::Id id = all.id(position);
-    if (leaf.closest)
-      leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(all.triangleOf(id));
+    const auto i = static_cast<std::size_t>(distances.nearest[v]);
+    const std::uint32_t triangle = all.triangleOf(all.id(positions_[i]));
+    if (leaf.closest) leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(triangle);
     if (!leaf.normals) continue;
-    const auto found =
-        std::lower_bound(features.begin(), features.end(), position) - features.begin();
-    const MeshFeature& feature = described[static_cast<std::size_t>(found)];
-    const Vec3d centre = it.getCoord().asVec3d() * field_.lattice_.pitch_mm;
-    Vec3d normal(0, 0, 0);
-    for (int f = 0; f < feature.rank; ++f) {
-      const LinearForm& form = feature.forms[static_cast<std::size_t>(f)];
-      normal += form.gradient * form.at(centre);
-    }
-    const double distance = normal.length();
-    if (distance < on_surface_mm) {
-      normal = all.normal(all.triangleOf(id));
-    } else {
-      normal /= *it < 0 ? -distance : distance;
-    }
+    const LatticeFeature& feature = tasks_[i / features_per_task].features[i % features_per_task];
+    const Vec3d centre = it.getCoord().asVec3d();
+    Vec3d away(0, 0, 0);  // from the nearest point to the centre
+    for (int f = 0; f < feature.rank; ++f)
+      away += feature.forms[f].gradient / pitch_mm * feature.forms[f].at(centre);
+    const double distance = away.length();
+    const Vec3d normal =
+        distance < on_surface_mm ? all.normal(triangle) : away / (*it < 0 ? -distance : distance);
     leaf.normals->buffer().data()[v] = openvdb::Vec3s(normal);
   }
 }
@@ -454,18 +535,67 @@ void MeshDistance::Chunk::appendTo(DistanceGrids& grids) {
   }
 }
 
+namespace {
+
+/// The greatest band, in diameters, of the normals whose components are at least `least`.
+double bandAcross(const Vec3d& least, const Vec3d& pitch_mm) {
+  double inverse_diameter = 1 / pitch_mm.length();
+  double step_mm = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double u = least[(axis + 1) % 3];
+    const double v = least[(axis + 2) % 3];
+    inverse_diameter = std::max(inverse_diameter, least[axis] / pitch_mm[axis]);
+    step_mm = std::max(step_mm, pitch_mm[axis] * std::sqrt(std::max(0.0, 1 - u * u - v * v)));
+  }
+  return std::max(1 / inverse_diameter, step_mm);
+}
+
+}  // namespace
+
 MeshDistance::MeshDistance(std::shared_ptr<const Mesh> mesh, const Lattice& lattice, Band band,
                            DistanceExtras extras)
     : mesh_(std::move(mesh)),
       lattice_(lattice),
       band_(band),
       extras_(extras),
-      features_(*mesh_, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers) {}
+      features_(*mesh_, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers) {
+  if (band_.mm > 0) return;
+  for (const Vec3d& least : features_.leastNormals())
+    triangle_band_mm_.push_back(
+        static_cast<float>(bandAcross(least, lattice_.pitch_mm) * band_.diameters));
+}
 
 double MeshDistance::memoryBytes() const {
   return static_cast<double>(mesh_->vertices.size() * sizeof(Vec3d) +
                              mesh_->triangles.size() * sizeof(Mesh::Triangle)) +
+         static_cast<double>(triangle_band_mm_.capacity() * sizeof(float)) +
          features_.memoryBytes();
+}
+
+/// How far a feature can matter to a voxel.
+double MeshDistance::reachMm() const {
+  return band_.mm > 0 ? band_.mm : 2 * backgroundMm() + lattice_.diagonalMm();
+}
+
+void MeshDistance::append(const CoordBBox& voxels, std::vector<std::uint32_t> features,
+                          DistanceGrids& grids) const {
+  const int middle = ((voxels.min().y() + voxels.max().y()) / 2 & ~(edge - 1)) - 1;
+  if (features.size() <= features_per_chunk || middle < voxels.min().y()) {
+    Chunk(*this, voxels, features).appendTo(grids);
+    return;
+  }
+  for (const bool upper : {false, true}) {
+    CoordBBox half = voxels;
+    (upper ? half.min().y() : half.max().y()) = middle + (upper ? 1 : 0);
+    std::vector<std::uint32_t> reaching;
+    std::copy_if(features.begin(), features.end(), std::back_inserter(reaching),
+                 [&](std::uint32_t position) {
+                   return features_.meets(position, 1,
+                                          half.min().y() * lattice_.pitch_mm.y() - reachMm(),
+                                          half.max().y() * lattice_.pitch_mm.y() + reachMm());
+                 });
+    append(half, std::move(reaching), grids);
+  }
 }
 
 DistanceGrids MeshDistance::run(ZRange core) const {
@@ -476,7 +606,7 @@ DistanceGrids MeshDistance::run(ZRange core) const {
     grid->setTransform(transformOf(lattice_));
     return grid;
   };
-  grids.surface = dress(openvdb::FloatGrid::create(static_cast<float>(band_.mm)), "surface",
+  grids.surface = dress(openvdb::FloatGrid::create(static_cast<float>(backgroundMm())), "surface",
                         openvdb::GRID_LEVEL_SET);
   if (extras_.normals) {
     grids.normals =
@@ -493,7 +623,10 @@ DistanceGrids MeshDistance::run(ZRange core) const {
     CoordBBox voxels = lattice_.box;
     voxels.min().z() = begin;
     voxels.max().z() = end - 1;
-    Chunk(*this, voxels).appendTo(grids);
+    append(voxels,
+           features_.collect(begin * lattice_.pitch_mm.z() - reachMm(),
+                             (end - 1) * lattice_.pitch_mm.z() + reachMm()),
+           grids);
     begin = end;
   }
   openvdb::tools::prune(grids.surface->tree());

@@ -10,8 +10,20 @@
 namespace vdbdither {
 
 /// How far from the surface distances are kept.
+///
+/// In diameters: where the surface has the normal n, `diameters` times the larger of the voxel's
+/// diameter along n (1 / ‖D n‖∞, twice k_D of eq. 6 in Morsy et al. 2022) and the most that the
+/// distance changes between neighbours (max |n_a|·pitch_a). One of them holds every voxel that
+/// dithering decides and every surface voxel: a leaf keeps the largest band of the surface near it,
+/// so that this is also so beside sharp edges.
 struct Band {
-  double mm = 0;
+  double diameters = 1;
+  double mm = 0;  ///< the same distance everywhere, in place of diameters, where it is not zero
+
+  /// The largest that it comes to on a lattice of this pitch.
+  [[nodiscard]] double greatestMm(const openvdb::Vec3d& pitch_mm) const {
+    return mm > 0 ? mm : diameters * pitch_mm.length();
+  }
 };
 
 /// What is kept besides the distance; none of it costs a second search.
@@ -48,7 +60,7 @@ struct DistanceGrids {
 /// is higher.
 class MeshDistance {
  public:
-  static constexpr int chunk_layers = 4 * leaf_layers;
+  static constexpr int chunk_layers = 8 * leaf_layers;
 
   /// `mesh` in mm. Positions are those of the lattice.
   MeshDistance(std::shared_ptr<const Mesh> mesh, const Lattice& lattice, Band band,
@@ -62,7 +74,7 @@ class MeshDistance {
   /// where an edge or a vertex is nearest).
   [[nodiscard]] DistanceGrids run(ZRange core) const;
 
-  [[nodiscard]] double backgroundMm() const { return band_.mm; }
+  [[nodiscard]] double backgroundMm() const { return band_.greatestMm(lattice_.pitch_mm); }
 
   /// Bytes held from construction on, the mesh included.
   [[nodiscard]] double memoryBytes() const;
@@ -70,11 +82,18 @@ class MeshDistance {
  private:
   class Chunk;
 
+  [[nodiscard]] double reachMm() const;
+  /// Makes `voxels`, which `features` may reach, in one piece or in several.
+  void append(const openvdb::CoordBBox& voxels, std::vector<std::uint32_t> features,
+              DistanceGrids& grids) const;
+
   std::shared_ptr<const Mesh> mesh_;
   Lattice lattice_;
   Band band_;
   DistanceExtras extras_;
   MeshFeatures features_;
+  std::vector<float>
+      triangle_band_mm_;  ///< of the face and its edges; empty where the band is in mm
 };
 
 }  // namespace vdbdither

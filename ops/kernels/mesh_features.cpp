@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include <tbb/parallel_for.h>
@@ -67,6 +68,8 @@ Vec3d anyPerpendicular(const Vec3d& unit) {
   const Vec3d across = unit.cross(other);
   return across / across.length();
 }
+
+Vec3d magnitudes(const Vec3d& v) { return {std::abs(v.x()), std::abs(v.y()), std::abs(v.z())}; }
 
 Vec3d componentMin(const Vec3d& a, const Vec3d& b) { return openvdb::math::minComponent(a, b); }
 Vec3d componentMax(const Vec3d& a, const Vec3d& b) { return openvdb::math::maxComponent(a, b); }
@@ -161,26 +164,21 @@ void MeshFeatures::findNeighbours() {
   }
 }
 
-MeshFeatures::Extent MeshFeatures::extent(Id id) const {
-  const auto of = [this](std::initializer_list<std::uint32_t> vertices) {
-    double low = std::numeric_limits<double>::infinity();
-    double high = -low;
-    for (const std::uint32_t v : vertices) {
-      low = std::min(low, positions_[v].z());
-      high = std::max(high, positions_[v].z());
-    }
-    return Extent{std::nextafter(static_cast<float>(low), -std::numeric_limits<float>::infinity()),
-                  std::nextafter(static_cast<float>(high), std::numeric_limits<float>::infinity())};
-  };
+MeshFeatures::Extent MeshFeatures::extent(Id id, int axis) const {
+  const auto of = [&](std::uint32_t vertex) { return positions_[vertex][axis]; };
   switch (id.kind()) {
     case Kind::face: {
       const Mesh::Triangle& t = mesh_.triangles[id.index()];
-      return of({t[0], t[1], t[2]});
+      const auto [low, high] = std::minmax({of(t[0]), of(t[1]), of(t[2])});
+      return {low, high};
     }
-    case Kind::edge:
-      return of({edges_[id.index()].from, edges_[id.index()].to});
+    case Kind::edge: {
+      const auto [low, high] =
+          std::minmax({of(edges_[id.index()].from), of(edges_[id.index()].to)});
+      return {low, high};
+    }
     case Kind::vertex:
-      return of({id.index()});
+      return {of(id.index()), of(id.index())};
   }
   return {0, 0};
 }
@@ -202,7 +200,7 @@ void MeshFeatures::sortByLayer(double layer_mm) {
   }
   const double bin_mm = std::max(layer_mm, (high - low) / 1e6);
   const auto bin = [&](Id id) {
-    return static_cast<std::size_t>(std::max(0.0, (extent(id).low - low) / bin_mm));
+    return static_cast<std::size_t>(std::max(0.0, (extent(id, 2).low - low) / bin_mm));
   };
   std::vector<std::uint32_t> first(static_cast<std::size_t>((high - low) / bin_mm) + 2, 0);
   for (const Id id : all) ++first[bin(id) + 1];
@@ -211,24 +209,26 @@ void MeshFeatures::sortByLayer(double layer_mm) {
   for (const Id id : all) order_[first[bin(id)]++] = id;
 
   for (std::size_t begin = 0; begin < order_.size(); begin += block_size) {
-    Extent block = extent(order_[begin]);
+    Extent block = extent(order_[begin], 2);
     for (std::size_t i = begin; i < std::min(begin + block_size, order_.size()); ++i) {
-      const Extent one = extent(order_[i]);
+      const Extent one = extent(order_[i], 2);
       block = {std::min(block.low, one.low), std::max(block.high, one.high)};
     }
     blocks_.push_back(block);
   }
 }
 
-void MeshFeatures::collect(double low, double high, std::vector<std::uint32_t>& found) const {
+std::vector<std::uint32_t> MeshFeatures::collect(double low, double high) const {
+  std::vector<std::uint32_t> found;
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     if (blocks_[b].low > high || blocks_[b].high < low) continue;
     const std::size_t end = std::min((b + 1) * block_size, order_.size());
     for (std::size_t i = b * block_size; i < end; ++i) {
-      const Extent one = extent(order_[i]);
-      if (one.low <= high && one.high >= low) found.push_back(static_cast<std::uint32_t>(i));
+      const auto position = static_cast<std::uint32_t>(i);
+      if (meets(position, 2, low, high)) found.push_back(position);
     }
   }
+  return found;
 }
 
 MeshFeature MeshFeatures::describe(Id id) const {
@@ -250,6 +250,7 @@ MeshFeature MeshFeatures::describeFace(std::uint32_t triangle) const {
       componentMin(componentMin(corner(triangle, 0), corner(triangle, 1)), corner(triangle, 2));
   face.max =
       componentMax(componentMax(corner(triangle, 0), corner(triangle, 1)), corner(triangle, 2));
+  face.below = face.above = magnitudes(n);
   if (n == Vec3d(0, 0, 0)) return face;
   face.rank = 1;
   face.bounds = 3;
@@ -259,7 +260,6 @@ MeshFeature MeshFeatures::describeFace(std::uint32_t triangle) const {
     const Vec3d& b = corner(triangle, (side + 1) % 3);
     face.forms[static_cast<std::size_t>(1 + side)] = halfSpace(n.cross(b - a), a);
   }
-  face.below = face.above = Vec3d(std::abs(n.x()), std::abs(n.y()), std::abs(n.z()));
   return face;
 }
 
@@ -326,6 +326,27 @@ MeshFeature MeshFeatures::describeVertex(std::uint32_t index) const {
     feature.forms[static_cast<std::size_t>(3 + feature.bounds++)] = halfSpace(p - other, p);
   }
   return feature;
+}
+
+std::vector<Vec3d> MeshFeatures::leastNormals() const {
+  std::vector<Vec3d> least(normals_.size());
+  std::transform(normals_.begin(), normals_.end(), least.begin(), magnitudes);
+  for (std::size_t e = 0; e + 1 < edges_.size(); ++e) {
+    const std::span halves(half_edges_.data() + edges_[e].first,
+                           edges_[e + 1].first - edges_[e].first);
+    Vec3d across(0, 0, 0);  // unknown at borders and where more than two faces meet
+    if (halves.size() == 2) {
+      const auto start = [&](std::size_t i) {
+        return mesh_.triangles[halves[i] / 3][halves[i] % 3];
+      };
+      const Vec3d& a = normals_[halves[0] / 3];
+      const Vec3d b = normals_[halves[1] / 3] * (start(0) == start(1) ? -1.0 : 1.0);
+      for (int axis = 0; axis < 3; ++axis)
+        if (a[axis] * b[axis] > 0) across[axis] = std::min(std::abs(a[axis]), std::abs(b[axis]));
+    }
+    for (const std::uint32_t half : halves) least[half / 3] = componentMin(least[half / 3], across);
+  }
+  return least;
 }
 
 std::uint32_t MeshFeatures::triangleOf(Id id) const {

@@ -13,7 +13,7 @@ namespace vdbdither {
 /// A linear function of the position: gradient · p + constant.
 struct LinearForm {
   openvdb::Vec3d gradient;
-  double constant = 0;
+  double constant;
 
   [[nodiscard]] double at(const openvdb::Vec3d& p) const { return gradient.dot(p) + constant; }
 };
@@ -31,7 +31,7 @@ struct MeshFeature {
   std::array<LinearForm, 3 + max_bounds> forms;
   openvdb::Vec3d min, max;  ///< bounding box of the feature, mm
   openvdb::Vec3d below,
-      above;  ///< the region within distance b lies between min − b·below and max + b·above
+      above;  ///< the region within distance b lies from min − b·below to max + b·above
 };
 
 /// The faces, edges and vertices of a mesh in rising order of their lowest layer.
@@ -61,9 +61,14 @@ class MeshFeatures {
   [[nodiscard]] std::size_t size() const { return order_.size(); }
   [[nodiscard]] Id id(std::size_t position) const { return order_[position]; }
 
-  /// Appends to `found` the positions of the features that reach into [low, high] mm, in rising
-  /// order. A few that do not may be among them.
-  void collect(double low, double high, std::vector<std::uint32_t>& found) const;
+  /// The positions of the features that meet the layers [low, high] mm, in rising order.
+  [[nodiscard]] std::vector<std::uint32_t> collect(double low, double high) const;
+
+  /// Whether the feature at `position` meets [low, high] mm along `axis`.
+  [[nodiscard]] bool meets(std::uint32_t position, int axis, double low, double high) const {
+    const Extent extent = this->extent(order_[position], axis);
+    return extent.low <= high && extent.high >= low;
+  }
 
   [[nodiscard]] MeshFeature describe(Id id) const;
 
@@ -79,6 +84,10 @@ class MeshFeatures {
     return normals_[triangle];
   }
 
+  /// By triangle: what the components of the normals of its face and of its three edges' wedges
+  /// come to at least.
+  [[nodiscard]] std::vector<openvdb::Vec3d> leastNormals() const;
+
   /// The lowest triangle that the feature belongs to.
   [[nodiscard]] std::uint32_t triangleOf(Id id) const;
 
@@ -89,7 +98,7 @@ class MeshFeatures {
         0;  ///< its half-edges in `half_edges_` end where those of the next edge begin
   };
   struct Extent {
-    float low, high;
+    double low, high;
   };
 
   void findNormals();
@@ -97,7 +106,7 @@ class MeshFeatures {
   void findNeighbours();
   void sortByLayer(double layer_mm);
 
-  [[nodiscard]] Extent extent(Id id) const;
+  [[nodiscard]] Extent extent(Id id, int axis) const;
   [[nodiscard]] MeshFeature describeFace(std::uint32_t triangle) const;
   [[nodiscard]] MeshFeature describeEdge(std::uint32_t index) const;
   [[nodiscard]] MeshFeature describeVertex(std::uint32_t index) const;

@@ -56,10 +56,10 @@ void visitRowCrossings(const std::array<openvdb::Vec3d, 3>& corners, const openv
     const int up_row = firstRow(y[0]);
     const int down_row = firstRow(y[1]);
     const int delta = up_row < down_row ? 1 : -1;
-    const double slope = (x[1] - x[0]) / (y[1] - y[0]);
+    const double along = y[1] - y[0];
     for (int j = std::min(up_row, down_row); j < std::max(up_row, down_row); ++j) {
-      const auto [x_low, x_high] = std::minmax(x[0], x[1]);
-      const double crossing = std::clamp(x[0] + (j * pitch_mm.y() - y[0]) * slope, x_low, x_high);
+      const double t = std::clamp((j * pitch_mm.y() - y[0]) / along, 0.0, 1.0);
+      const double crossing = x[0] + t * (x[1] - x[0]);
       const double i =
           std::max(std::ceil(crossing / pitch_mm.x()), static_cast<double>(box.min().x()));
       if (i <= box.max().x()) visit(openvdb::Coord(static_cast<int>(i), j, k), delta);

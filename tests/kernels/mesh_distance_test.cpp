@@ -84,7 +84,7 @@ Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm, const Vec3d& orig
 
 DistanceGrids distances(const Mesh& mesh, const Lattice& lattice, double band_mm,
                         DistanceExtras extras = {}) {
-  return MeshDistance(std::make_shared<Mesh>(mesh), lattice, Band{band_mm}, extras)
+  return MeshDistance(std::make_shared<Mesh>(mesh), lattice, Band{0, band_mm}, extras)
       .run(lattice.layers());
 }
 
@@ -255,7 +255,7 @@ void expectSame(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
 TEST(MeshDistance, SlabsOfAnyHeightGiveTheWhole) {
   const Mesh mesh = transformed(torusMesh({0, 0, 0}, 0.8, 0.3, 30), {20, 30, 0}, {0.3, 0, 0});
   const Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);
-  const MeshDistance field(std::make_shared<Mesh>(mesh), lattice, Band{0.12});
+  const MeshDistance field(std::make_shared<Mesh>(mesh), lattice, Band{0, 0.12});
   const DistanceGrids whole = field.run(lattice.layers());
   for (const int height : {8, 16, 40}) {
     const auto pieces = openvdb::FloatGrid::create(0.12F);
