@@ -82,7 +82,7 @@ class Mask : public Source {
   [[nodiscard]] double memoryBytes() const override {
     const Coord size = tileSize();
     const double ranks = 4.0 * size.x() * size.y() * size.z();
-    return kind_ == "void-and-cluster" ? 6 * ranks : ranks;
+    return kind_ == "void-and-cluster" ? 8 * ranks : 2 * ranks;
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {

@@ -219,9 +219,9 @@ std::vector<WeightedNormal> normalsOfHalfSphere(double step_degrees) {
 std::vector<WeightedNormal> normalsNearAxes() {
   std::vector<WeightedNormal> normals;
   for (int axis = 0; axis < 3; ++axis) {
-    for (int half_degrees = 1; half_degrees <= 16; ++half_degrees) {
-      for (int around = 0; around < 24; ++around) {
-        const Vec3d tilted = polar(half_degrees / 2.0, around * 15.0);
+    for (const double degrees : {0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0}) {
+      for (int azimuth = 0; azimuth < 360; azimuth += 30) {
+        const Vec3d tilted = polar(degrees, azimuth);
         Vec3d normal;
         for (int i = 0; i < 3; ++i) normal[(axis + 1 + i) % 3] = tilted[i];
         normals.push_back({normal, 1.0});

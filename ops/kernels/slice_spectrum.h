@@ -75,7 +75,6 @@ class SliceSpectra {
   };
   void addProjection(const openvdb::Vec3d& normal, std::vector<double>& sums, Bands& white) const;
   void addVoxelPlane(const openvdb::Vec3d& normal, std::vector<double>& sums, Bands& white) const;
-
   void add(double weight, const float* power, double* sums) const;
 
   std::size_t count_;
@@ -104,7 +103,8 @@ struct WeightedNormal {
 /// The half sphere in steps of the polar and the azimuthal angle, weighted by area.
 std::vector<WeightedNormal> normalsOfHalfSphere(double step_degrees);
 
-/// Normals 0.5°, 1°, … 8° off an axis of the lattice, every 15° around it: the longest staircases.
+/// Normals 0.5°, 1°, 2°, … 8° off an axis of the lattice, every 30° around it: the longest
+/// staircases.
 std::vector<WeightedNormal> normalsNearAxes();
 
 /// Per spectrum. progress: called with the fraction done; may throw to stop.

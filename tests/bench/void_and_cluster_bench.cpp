@@ -38,17 +38,17 @@ void makeMask(benchmark::State& state, MaskKernel::Shape shape, InstructionSet i
 
 void sizesAndSigmas(benchmark::internal::Benchmark* run) {
   run->ArgNames({"size", "sigma_tenths"})->Unit(benchmark::kSecond)->Iterations(1);
-  for (const int size : {16, 32, 64, 128}) run->Args({size, 11});
+  for (const int size : {16, 32, 48, 64, 96, 128}) run->Args({size, 11});
   for (const int sigma : {5, 8, 15, 19, 25, 31}) run->Args({64, sigma});
 }
 
 using Shape = MaskKernel::Shape;
 const InstructionSet best = bestInstructionSet();
 constexpr InstructionSet baseline = InstructionSet::baseline;
-BENCHMARK_CAPTURE(makeMask, gauss / best, Shape::gauss, best)->Apply(sizesAndSigmas);
-BENCHMARK_CAPTURE(makeMask, gauss / baseline, Shape::gauss, baseline)->Apply(sizesAndSigmas);
-BENCHMARK_CAPTURE(makeMask, peters / best, Shape::peters, best)->Apply(sizesAndSigmas);
-BENCHMARK_CAPTURE(makeMask, peters / baseline, Shape::peters, baseline)->Apply(sizesAndSigmas);
+BENCHMARK_CAPTURE(makeMask, gauss_best, Shape::gauss, best)->Apply(sizesAndSigmas);
+BENCHMARK_CAPTURE(makeMask, gauss_baseline, Shape::gauss, baseline)->Apply(sizesAndSigmas);
+BENCHMARK_CAPTURE(makeMask, peters_best, Shape::peters, best)->Apply(sizesAndSigmas);
+BENCHMARK_CAPTURE(makeMask, peters_baseline, Shape::peters, baseline)->Apply(sizesAndSigmas);
 
 }  // namespace
 }  // namespace vdbdither
