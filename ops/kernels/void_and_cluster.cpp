@@ -2,9 +2,15 @@
 // (1993), in N dimensions as Peters, "Free blue noise textures" (2016). Ulichney's third phase,
 // which takes the tightest clusters of unset voxels, is the second one continued: on the torus the
 // energies by set and by unset voxels add up to a constant.
+//
+// The time goes into cache lines: the voxel that follows lies anywhere in the tile. So energies are
+// stored in bricks of one line, the kernel is cut into the same bricks once for every position of
+// its centre in a brick, and the extremum is found through lower bounds that are looked at again
+// only when they are the least.
 #include "ops/kernels/void_and_cluster.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -13,264 +19,375 @@ namespace vdbdither {
 
 namespace {
 
-using Energy = std::int64_t;
+using openvdb::Coord;
 
-/// Set voxels carry this on top of their energy: the least energy is always a void, the greatest a
-/// cluster.
-constexpr Energy set_bias = Energy{1} << 62;
+constexpr std::size_t whole_brick = 16;
 
-/// Weights are added in whole registers: rows of weights are followed by as many zeros as a
-/// register holds, and lines of energies by as many values that mean nothing. (A cache line of them
-/// also keeps lines from falling on each other in the cache.)
-constexpr int lanes = 4;
-constexpr int line_padding = 8;
-
-/// The weights of a kernel along x, at one offset in y and z.
-struct KernelRow {
-  int x, y, z;        ///< offset of the first weight, each in [0, size)
-  int count;          ///< weights, without the zeros that follow them
-  std::size_t first;  ///< of the weights
-};
-
-struct IntegerKernel {
-  std::vector<KernelRow>
-      rows;  ///< by falling count of registers, so that branches are foreseen; then by z and y
-  std::vector<Energy> weights;
-  bool negative = false;  ///< whether any weight is
-};
-
-int bitsFor(double value) { return std::max(0, static_cast<int>(std::ceil(std::log2(value)))); }
-
-/// The kernel as integers times 2^tie_bits, as fine as the sum over a tile allows.
-IntegerKernel integerKernel(const VoidAndCluster& settings, int tie_bits) {
-  const openvdb::Coord& size = settings.size;
-  const ToroidalKernel kernel(settings.kernel, size);
-  const double smallest = smallestWeight(settings);
-  double sum = 0;
-  for (int z = 0; z < size.z(); ++z) {
-    for (int y = 0; y < size.y(); ++y) {
-      for (int x = 0; x < size.x(); ++x) sum += std::abs(kernel(x, y, z));
-    }
-  }
-  const double scale = std::ldexp(1.0, std::min(40, 60 - tie_bits - bitsFor(sum)));
-
-  IntegerKernel result;
-  std::vector<Energy> row(size.x());
-  for (int z = 0; z < size.z(); ++z) {
-    for (int y = 0; y < size.y(); ++y) {
-      const int begin = -(size.x() / 2);
-      int first = size.x();
-      int last = -1;
-      for (int i = 0; i < size.x(); ++i) {
-        const int x = begin + i;
-        const double weight = kernel(x < 0 ? x + size.x() : x, y, z);
-        row[i] = std::abs(weight) < smallest
-                     ? 0
-                     : std::llround(weight * scale) * (Energy{1} << tie_bits);
-        if (row[i] == 0) continue;
-        first = std::min(first, i);
-        last = i;
-      }
-      if (last < 0) continue;
-      const int x = begin + first;
-      result.rows.push_back(
-          {x < 0 ? x + size.x() : x, y, z, last - first + 1, result.weights.size()});
-      for (int i = first; i <= last; ++i) {
-        result.weights.push_back(row[i]);
-        result.negative |= row[i] < 0;
-      }
-      result.weights.resize(result.weights.size() + lanes);
-    }
-  }
-  std::stable_sort(result.rows.begin(), result.rows.end(),
-                   [](const KernelRow& a, const KernelRow& b) {
-                     return (a.count - 1) / lanes > (b.count - 1) / lanes;
-                   });
-  return result;
-}
-
-/// A tile of energies: lines along x, one after the other in y, then z.
-class Tile {
+/// Where voxels are stored: bricks of 4 × 2 × 2 voxels, less along axes that these do not divide,
+/// one after the other.
+class Bricks {
  public:
-  explicit Tile(const openvdb::Coord& size)
-      : size_(size),
-        line_(size.x() + line_padding),
-        energies_(line_ * static_cast<std::size_t>(size.y()) * size.z()) {}
+  explicit Bricks(const Coord& size) : size_(size) {
+    for (int axis = 0; axis < 3; ++axis) {
+      int& edge = edge_[axis];
+      edge = axis == 0 ? 4 : 2;
+      while (size[axis] % edge != 0) edge /= 2;
+      count_[axis] = size[axis] / edge;
+    }
+  }
 
-  [[nodiscard]] const openvdb::Coord& size() const { return size_; }
-  [[nodiscard]] Energy* line(int y, int z) { return energies_.data() + line_ * lineIndex(y, z); }
-  [[nodiscard]] const Energy* line(int y, int z) const {
-    return energies_.data() + line_ * lineIndex(y, z);
+  [[nodiscard]] const Coord& size() const { return size_; }
+  [[nodiscard]] const Coord& edge() const { return edge_; }
+  /// Bricks along each axis.
+  [[nodiscard]] const Coord& count() const { return count_; }
+  /// Voxels in a brick.
+  [[nodiscard]] std::size_t volume() const { return volume(edge_); }
+  [[nodiscard]] std::size_t voxels() const { return volume(size_); }
+
+  [[nodiscard]] Coord brickOf(const Coord& voxel) const {
+    return {voxel.x() / edge_.x(), voxel.y() / edge_.y(), voxel.z() / edge_.z()};
   }
-  [[nodiscard]] std::size_t lineIndex(int y, int z) const {
-    return y + static_cast<std::size_t>(size_.y()) * z;
+  [[nodiscard]] std::size_t positionInBrick(const Coord& voxel) const {
+    return index({voxel.x() % edge_.x(), voxel.y() % edge_.y(), voxel.z() % edge_.z()}, edge_);
   }
-  [[nodiscard]] Energy& at(const openvdb::Coord& voxel) {
-    return line(voxel.y(), voxel.z())[voxel.x()];
+  [[nodiscard]] std::size_t stored(const Coord& voxel) const {
+    return index(brickOf(voxel), count_) * volume() + positionInBrick(voxel);
+  }
+  [[nodiscard]] Coord voxel(std::size_t stored) const {
+    const Coord brick = position(stored / volume(), count_);
+    const Coord inside = position(stored % volume(), edge_);
+    return {brick.x() * edge_.x() + inside.x(), brick.y() * edge_.y() + inside.y(),
+            brick.z() * edge_.z() + inside.z()};
+  }
+
+  /// x fastest.
+  static std::size_t index(const Coord& at, const Coord& size) {
+    return at.x() + static_cast<std::size_t>(size.x()) *
+                        (at.y() + static_cast<std::size_t>(size.y()) * at.z());
+  }
+  static Coord position(std::size_t index, const Coord& size) {
+    const std::size_t x = size.x();
+    const std::size_t y = size.y();
+    return {static_cast<int>(index % x), static_cast<int>(index / x % y),
+            static_cast<int>(index / x / y)};
   }
 
  private:
-  openvdb::Coord size_;
-  std::size_t line_;
-  std::vector<Energy> energies_;
+  static std::size_t volume(const Coord& size) { return index({0, 0, size.z()}, size); }
+
+  Coord size_;
+  Coord edge_;
+  Coord count_;
 };
 
-int wrapped(int value, int period) { return value < period ? value : value - period; }
+/// How energies of one type are laid out in bits, from above: the sign, set or not, the sum of
+/// weights, the order among equals.
+template <class Energy>
+struct Bits {
+  /// Set voxels carry this on top of their energy: the least energy is always a void, the greatest
+  /// a cluster.
+  static constexpr int set = std::numeric_limits<Energy>::digits - 1;
+  static constexpr int ties = sizeof(Energy) == 8 ? 15 : 4;
+  static constexpr int finest = 40;
+};
 
-/// Adds sign · weight to `count` energies, and zero or junk to the padding behind them.
-template <int sign>
-[[gnu::always_inline]] inline void addWeights(Energy* __restrict energies,
-                                              const Energy* __restrict weights, int count) {
-  for (int i = 0; i < count; i += lanes) {
-    for (int lane = 0; lane < lanes; ++lane) energies[i + lane] += sign * weights[i + lane];
+/// The kernel around a centre at one position in its brick, as bricks of integer weights.
+template <class Energy>
+struct CentredKernel {
+  /// Bricks from that of the centre on, each in [0, count of bricks).
+  struct Offset {
+    std::uint16_t x, y, z;
+  };
+  std::vector<Offset> bricks;
+  std::size_t negative_bricks = 0;  ///< how many hold a negative weight; they come first
+  std::vector<Energy> weights;      ///< brick by brick
+};
+
+/// For every position of the centre in its brick.
+template <class Energy>
+using IntegerKernel = std::vector<CentredKernel<Energy>>;
+
+template <class Energy>
+IntegerKernel<Energy> integerKernel(const VoidAndCluster& settings, const Bricks& bricks) {
+  const Coord& size = settings.size;
+  const ToroidalKernel kernel(settings.kernel, size);
+  const double smallest = smallestWeight(size);
+  double sum = 0;
+  Coord reach(0, 0, 0);
+  std::vector<double> values(bricks.voxels());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const Coord d = Bricks::position(i, size);
+    const double value = kernel(d.x(), d.y(), d.z());
+    if (std::abs(value) < smallest) continue;
+    values[i] = value;
+    sum += std::abs(value);
   }
+  const int bits =
+      std::min(Bits<Energy>::finest,
+               std::ilogb(0.99 * std::ldexp(1.0, Bits<Energy>::set - Bits<Energy>::ties) / sum));
+  const double scale = std::ldexp(1.0, bits);
+  std::vector<Energy> weights(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    weights[i] =
+        static_cast<Energy>(std::llround(values[i] * scale)) * (Energy{1} << Bits<Energy>::ties);
+    if (weights[i] == 0) continue;
+    const Coord d = Bricks::position(i, size);
+    for (int axis = 0; axis < 3; ++axis)
+      reach[axis] = std::max(reach[axis], std::min(d[axis], size[axis] - d[axis]));
+  }
+
+  // Along each axis, the bricks that hold a voxel within reach of the centre's.
+  std::array<std::vector<std::uint16_t>, 3> near;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int brick = 0; brick < bricks.count()[axis]; ++brick) {
+      const int distance = std::min(brick, bricks.count()[axis] - brick) - 1;
+      if (distance * bricks.edge()[axis] < reach[axis])
+        near[axis].push_back(static_cast<std::uint16_t>(brick));
+    }
+  }
+  const std::size_t volume = bricks.volume();
+  IntegerKernel<Energy> result(volume);
+  std::vector<Energy> brick(volume);
+  for (const bool negative : {true, false}) {
+    for (std::size_t centre = 0; centre < volume; ++centre) {
+      CentredKernel<Energy>& centred = result[centre];
+      const Coord from = Bricks::position(centre, bricks.edge());
+      for (const std::uint16_t z : near[2]) {
+        for (const std::uint16_t y : near[1]) {
+          for (const std::uint16_t x : near[0]) {
+            for (std::size_t i = 0; i < volume; ++i) {
+              const Coord inside = Bricks::position(i, bricks.edge());
+              const Coord d(x * bricks.edge().x() + inside.x() - from.x(),
+                            y * bricks.edge().y() + inside.y() - from.y(),
+                            z * bricks.edge().z() + inside.z() - from.z());
+              brick[i] = weights[Bricks::index(
+                  {d.x() < 0 ? d.x() + size.x() : d.x(), d.y() < 0 ? d.y() + size.y() : d.y(),
+                   d.z() < 0 ? d.z() + size.z() : d.z()},
+                  size)];
+            }
+            const auto [least, greatest] = std::minmax_element(brick.begin(), brick.end());
+            if ((*least == 0 && *greatest == 0) || (*least < 0) != negative) continue;
+            centred.bricks.push_back({x, y, z});
+            centred.weights.insert(centred.weights.end(), brick.begin(), brick.end());
+          }
+        }
+      }
+      if (negative) centred.negative_bricks = centred.bricks.size();
+    }
+  }
+  return result;
 }
 
-/// Adds the kernel around `centre` (sign 1) or takes it away (sign -1).
-template <int sign>
-[[gnu::always_inline]] inline void deposit(Tile& tile, const IntegerKernel& kernel,
-                                           const openvdb::Coord& centre) {
-  const openvdb::Coord size = tile.size();
-  for (const KernelRow& row : kernel.rows) {
-    Energy* const line =
-        tile.line(wrapped(centre.y() + row.y, size.y()), wrapped(centre.z() + row.z, size.z()));
-    const Energy* const weights = kernel.weights.data() + row.first;
-    const int x = wrapped(centre.x() + row.x, size.x());
-    const int before_seam = std::min(row.count, size.x() - x);
-    addWeights<sign>(line + x, weights, before_seam);
-    if (before_seam < row.count)
-      addWeights<sign>(line, weights + before_seam, row.count - before_seam);
+/// The energies of a tile and where the bricks around one of them lie.
+template <class Energy>
+class Tile {
+ public:
+  explicit Tile(const Coord& size) : bricks_(size), energies_(bricks_.voxels()) {
+    std::size_t step = bricks_.volume();
+    for (int axis = 0; axis < 3; ++axis) {
+      const int count = bricks_.count()[axis];
+      for (int i = 0; i < 2 * count; ++i) steps_[axis].push_back(i % count * step);
+      step *= count;
+    }
+  }
+
+  [[nodiscard]] const Bricks& bricks() const { return bricks_; }
+  [[nodiscard]] std::vector<Energy>& energies() { return energies_; }
+  [[nodiscard]] const std::vector<Energy>& energies() const { return energies_; }
+  /// Where the brick stored from [x] + [y] + [z] of these on is, for offsets from `brick`.
+  [[nodiscard]] std::array<const std::size_t*, 3> from(const Coord& brick) const {
+    return {steps_[0].data() + brick.x(), steps_[1].data() + brick.y(),
+            steps_[2].data() + brick.z()};
+  }
+
+ private:
+  Bricks bricks_;
+  std::vector<Energy> energies_;
+  std::array<std::vector<std::size_t>, 3> steps_;
+};
+
+/// Bounds are kept for groups of this many values, and for groups of as many groups.
+constexpr std::size_t group = 64;
+
+/// Lower bounds of sign · energy: of every group of energies, of every group of those, and so on.
+template <class Energy>
+using Bounds = std::vector<std::vector<Energy>>;
+
+/// Adds the kernel around a voxel (sign 1) or takes it away (sign -1). Bricks of `fixed` voxels
+/// where it is not zero.
+template <int sign, std::size_t fixed, class Energy>
+[[gnu::always_inline]] inline void deposit(Tile<Energy>& tile, const IntegerKernel<Energy>& kernel,
+                                           const Coord& centre) {
+  const std::size_t volume = fixed ? fixed : tile.bricks().volume();
+  const CentredKernel<Energy>& centred = kernel[tile.bricks().positionInBrick(centre)];
+  const auto [x, y, z] = tile.from(tile.bricks().brickOf(centre));
+  Energy* const energies = tile.energies().data();
+  const Energy* __restrict weight = centred.weights.data();
+  // All lines are asked for before the first is needed: this halves the time of a tile beyond the
+  // cache.
+  for (const auto& brick : centred.bricks) {
+    __builtin_prefetch(energies + x[brick.x] + y[brick.y] + z[brick.z], 1);
+  }
+  for (const auto& brick : centred.bricks) {
+    Energy* __restrict const energy = energies + x[brick.x] + y[brick.y] + z[brick.z];
+    for (std::size_t i = 0; i < volume; ++i) energy[i] += sign * weight[i];
+    weight += volume;
   }
 }
 
 /// The least of sign · value over `count` ≥ 1 values.
-template <int sign>
-[[gnu::always_inline]] inline Energy leastOf(const Energy* values, int count) {
+template <int sign, class Energy>
+[[gnu::always_inline]] inline Energy leastOf(const Energy* values, std::size_t count) {
   Energy least = std::numeric_limits<Energy>::max();
-  for (int i = 0; i < count; ++i) least = std::min(least, sign * values[i]);
+  for (std::size_t i = 0; i < count; ++i) least = std::min<Energy>(least, sign * values[i]);
   return least;
 }
 
-/// Lower bounds of sign · energy.
-struct Bounds {
-  std::vector<Energy> lines;
-  std::vector<Energy> layers;  ///< the least of the lines of each
-};
-
-/// Lowers the bounds to the energies that the kernel around `centre` covers.
-template <int sign>
-[[gnu::always_inline]] inline void lowerBounds(const Tile& tile, const IntegerKernel& kernel,
-                                               const openvdb::Coord& centre, Bounds& bounds) {
-  const openvdb::Coord size = tile.size();
-  for (const KernelRow& row : kernel.rows) {
-    const int y = wrapped(centre.y() + row.y, size.y());
-    const int z = wrapped(centre.z() + row.z, size.z());
-    const Energy* const line = tile.line(y, z);
-    const int x = wrapped(centre.x() + row.x, size.x());
-    const int before_seam = std::min(row.count, size.x() - x);
-    Energy least = leastOf<sign>(line + x, before_seam);
-    if (before_seam < row.count)
-      least = std::min(least, leastOf<sign>(line, row.count - before_seam));
-    Energy& bound = bounds.lines[tile.lineIndex(y, z)];
-    bound = std::min(bound, least);
-    bounds.layers[z] = std::min(bounds.layers[z], least);
+/// Lowers the bounds to the energies in the first bricks of the kernel around `centre`.
+template <int sign, std::size_t fixed, class Energy>
+[[gnu::always_inline]] inline void lowerBounds(const Tile<Energy>& tile,
+                                               const CentredKernel<Energy>& kernel,
+                                               std::size_t brick_count, const Coord& centre,
+                                               Bounds<Energy>& bounds) {
+  const std::size_t volume = fixed ? fixed : tile.bricks().volume();
+  const auto [x, y, z] = tile.from(tile.bricks().brickOf(centre));
+  for (std::size_t i = 0; i < brick_count; ++i) {
+    const auto& brick = kernel.bricks[i];
+    std::size_t at = x[brick.x] + y[brick.y] + z[brick.z];
+    const Energy least = leastOf<sign>(tile.energies().data() + at, volume);
+    for (std::vector<Energy>& level : bounds) {
+      at /= group;
+      if (level[at] <= least) break;
+      level[at] = least;
+    }
   }
 }
 
 /// The loops above, compiled for an instruction set.
-template <int sign>
+template <int sign, class Energy>
 struct Loops {
-  void (*deposit)(Tile&, const IntegerKernel&, const openvdb::Coord&);
-  Energy (*least)(const Energy*, int);
-  void (*lower_bounds)(const Tile&, const IntegerKernel&, const openvdb::Coord&, Bounds&);
+  void (*deposit)(Tile<Energy>&, const IntegerKernel<Energy>&, const Coord&);
+  Energy (*least)(const Energy*, std::size_t);
+  void (*lower_bounds)(const Tile<Energy>&, const CentredKernel<Energy>&, std::size_t, const Coord&,
+                       Bounds<Energy>&);
 };
 
-template <int sign>
-constexpr Loops<sign> baseline_loops{
-    [](Tile& tile, const IntegerKernel& kernel, const openvdb::Coord& centre) {
-      deposit<sign>(tile, kernel, centre);
-    },
-    [](const Energy* values, int count) { return leastOf<sign>(values, count); },
-    [](const Tile& tile, const IntegerKernel& kernel, const openvdb::Coord& centre,
-       Bounds& bounds) { lowerBounds<sign>(tile, kernel, centre, bounds); }};
-
-#if defined(__x86_64__)
-template <int sign>
-[[gnu::target("avx2")]] void depositAvx2(Tile& tile, const IntegerKernel& kernel,
-                                         const openvdb::Coord& centre) {
-  deposit<sign>(tile, kernel, centre);
+template <int sign, std::size_t fixed, class Energy>
+void depositBaseline(Tile<Energy>& tile, const IntegerKernel<Energy>& kernel, const Coord& centre) {
+  deposit<sign, fixed>(tile, kernel, centre);
 }
-template <int sign>
-[[gnu::target("avx2")]] Energy leastAvx2(const Energy* values, int count) {
+template <int sign, class Energy>
+Energy leastBaseline(const Energy* values, std::size_t count) {
   return leastOf<sign>(values, count);
 }
-template <int sign>
-[[gnu::target("avx2")]] void lowerBoundsAvx2(const Tile& tile, const IntegerKernel& kernel,
-                                             const openvdb::Coord& centre, Bounds& bounds) {
-  lowerBounds<sign>(tile, kernel, centre, bounds);
+template <int sign, std::size_t fixed, class Energy>
+void lowerBoundsBaseline(const Tile<Energy>& tile, const CentredKernel<Energy>& kernel,
+                         std::size_t bricks, const Coord& centre, Bounds<Energy>& bounds) {
+  lowerBounds<sign, fixed>(tile, kernel, bricks, centre, bounds);
 }
-template <int sign>
-constexpr Loops<sign> avx2_loops{depositAvx2<sign>, leastAvx2<sign>, lowerBoundsAvx2<sign>};
+
+#if defined(__x86_64__)
+#define VDBDITHER_AVX2 [[gnu::target("avx2")]]
 #else
-template <int sign>
-constexpr Loops<sign> avx2_loops = baseline_loops<sign>;
+#define VDBDITHER_AVX2
 #endif
 
-template <int sign>
-const Loops<sign>& loops(InstructionSet instructions) {
-  return instructions == InstructionSet::avx2 ? avx2_loops<sign> : baseline_loops<sign>;
+template <int sign, std::size_t fixed, class Energy>
+VDBDITHER_AVX2 void depositAvx2(Tile<Energy>& tile, const IntegerKernel<Energy>& kernel,
+                                const Coord& centre) {
+  deposit<sign, fixed>(tile, kernel, centre);
+}
+template <int sign, class Energy>
+VDBDITHER_AVX2 Energy leastAvx2(const Energy* values, std::size_t count) {
+  return leastOf<sign>(values, count);
+}
+template <int sign, std::size_t fixed, class Energy>
+VDBDITHER_AVX2 void lowerBoundsAvx2(const Tile<Energy>& tile, const CentredKernel<Energy>& kernel,
+                                    std::size_t bricks, const Coord& centre,
+                                    Bounds<Energy>& bounds) {
+  lowerBounds<sign, fixed>(tile, kernel, bricks, centre, bounds);
 }
 
-constexpr Energy lowest = std::numeric_limits<Energy>::min();
+template <int sign, std::size_t fixed, class Energy>
+Loops<sign, Energy> loopsFor(InstructionSet instructions) {
+  if (instructions == InstructionSet::avx2) {
+    return {depositAvx2<sign, fixed, Energy>, leastAvx2<sign, Energy>,
+            lowerBoundsAvx2<sign, fixed, Energy>};
+  }
+  return {depositBaseline<sign, fixed, Energy>, leastBaseline<sign, Energy>,
+          lowerBoundsBaseline<sign, fixed, Energy>};
+}
 
-/// Finds the voxel where sign · energy is least. Holds a lower bound for every line and every layer
-/// of lines, and looks again only at the line whose bound is least: energies that rise leave the
-/// bounds true.
-template <int sign>
+template <int sign, class Energy>
+Loops<sign, Energy> loopsFor(InstructionSet instructions, const Bricks& bricks) {
+  return bricks.volume() == whole_brick ? loopsFor<sign, whole_brick, Energy>(instructions)
+                                        : loopsFor<sign, 0, Energy>(instructions);
+}
+
+/// Finds the voxel where sign · energy is least, the first stored of equals. Energies that rise
+/// leave its bounds true.
+template <int sign, class Energy>
 class Extremum {
  public:
-  Extremum(const Tile& tile, InstructionSet instructions)
+  Extremum(const Tile<Energy>& tile, InstructionSet instructions)
       : tile_(tile),
-        energies_(loops<sign>(instructions)),
-        least_bound_(loops<1>(instructions).least),
-        bounds_{std::vector<Energy>(tile.lineIndex(0, tile.size().z()), lowest),
-                std::vector<Energy>(tile.size().z(), lowest)} {}
+        loops_(loopsFor<sign, Energy>(instructions, tile.bricks())),
+        least_bound_(loopsFor<1, Energy>(instructions, tile.bricks()).least) {
+    std::size_t count = tile.energies().size();
+    do {
+      count = (count + group - 1) / group;
+      bounds_.emplace_back(count, std::numeric_limits<Energy>::min());
+    } while (count > 1);
+  }
 
   /// Keeps the bounds true after the kernel around `centre` was added (change 1) or taken away
   /// (change -1).
-  void follow(const IntegerKernel& kernel, const openvdb::Coord& centre, int change) {
-    if (change == sign && !kernel.negative) return;
-    energies_.lower_bounds(tile_, kernel, centre, bounds_);
+  void follow(const IntegerKernel<Energy>& kernel, const Coord& centre, int change) {
+    const CentredKernel<Energy>& centred = kernel[tile_.bricks().positionInBrick(centre)];
+    loops_.lower_bounds(tile_, centred,
+                        change == sign ? centred.negative_bricks : centred.bricks.size(), centre,
+                        bounds_);
   }
 
-  openvdb::Coord find() {
-    const Energy* exact = nullptr;
+  Coord find() {
+    const std::vector<Energy>& energies = tile_.energies();
+    std::size_t exact = energies.size();
     while (true) {
-      const int z = whereLeast(bounds_.layers.data(), tile_.size().z());
-      Energy* const layer = bounds_.lines.data() + tile_.lineIndex(0, z);
-      const int y = whereLeast(layer, tile_.size().y());
-      const Energy* const line = tile_.line(y, z);
-      if (line == exact) return {where(line, sign * layer[y]), y, z};
-      layer[y] = energies_.least(line, tile_.size().x());
-      bounds_.layers[z] = least_bound_(layer, tile_.size().y());
-      exact = line;
+      std::size_t at = 0;
+      for (auto level = bounds_.rbegin(); level != bounds_.rend(); ++level)
+        at = whereLeast(*level, at);
+      if (at == exact) {
+        std::size_t found = at * group;
+        while (sign * energies[found] != bounds_[0][at]) ++found;
+        return tile_.bricks().voxel(found);
+      }
+      exact = at;
+      bounds_[0][at] = loops_.least(energies.data() + at * group, groupSize(energies, at));
+      for (std::size_t level = 1; level < bounds_.size(); ++level) {
+        at /= group;
+        bounds_[level][at] = leastBound(bounds_[level - 1], at);
+      }
     }
   }
 
  private:
-  static int where(const Energy* values, Energy value) {
-    int i = 0;
-    while (values[i] != value) ++i;
-    return i;
+  static std::size_t groupSize(const std::vector<Energy>& values, std::size_t at) {
+    return std::min(group, values.size() - at * group);
   }
-  int whereLeast(const Energy* values, int count) const {
-    return where(values, least_bound_(values, count));
+  Energy leastBound(const std::vector<Energy>& bounds, std::size_t at) const {
+    return least_bound_(bounds.data() + at * group, groupSize(bounds, at));
+  }
+  std::size_t whereLeast(const std::vector<Energy>& bounds, std::size_t at) const {
+    const Energy least = leastBound(bounds, at);
+    std::size_t where = at * group;
+    while (bounds[where] != least) ++where;
+    return where;
   }
 
-  const Tile& tile_;
-  const Loops<sign>& energies_;
-  Energy (*least_bound_)(const Energy*, int);
-  Bounds bounds_;
+  const Tile<Energy>& tile_;
+  Loops<sign, Energy> loops_;
+  Energy (*least_bound_)(const Energy*, std::size_t);
+  Bounds<Energy> bounds_;
 };
 
 /// Counts the steps of a run and reports now and then.
@@ -287,6 +404,74 @@ class Progress {
   double steps_;
   std::uint64_t done_ = 0;
 };
+
+template <class Energy>
+std::vector<std::uint32_t> ranksOf(const VoidAndCluster& settings,
+                                   const std::function<void(double)>& progress,
+                                   InstructionSet instructions) {
+  constexpr Energy set_bias = Energy{1} << Bits<Energy>::set;
+  Tile<Energy> tile(settings.size);
+  const Bricks& bricks = tile.bricks();
+  const IntegerKernel<Energy> kernel = integerKernel<Energy>(settings, bricks);
+  const auto count = static_cast<std::uint32_t>(bricks.voxels());
+  const std::uint32_t initial = initialCount(count);
+  const std::vector<std::uint32_t> order = randomPermutation(count, settings.seed);
+  Progress work(progress, count + 1.4 * initial);
+
+  const auto add = loopsFor<1, Energy>(instructions, bricks).deposit;
+  const auto subtract = loopsFor<-1, Energy>(instructions, bricks).deposit;
+  const auto set = [&](const Coord& voxel) {
+    add(tile, kernel, voxel);
+    tile.energies()[bricks.stored(voxel)] += set_bias;
+    work.step();
+  };
+  const auto clear = [&](const Coord& voxel) {
+    subtract(tile, kernel, voxel);
+    tile.energies()[bricks.stored(voxel)] -= set_bias;
+  };
+
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Coord voxel = Bricks::position(i, settings.size);
+    tile.energies()[bricks.stored(voxel)] += order[i] % (1u << Bits<Energy>::ties);
+    if (order[i] < initial) set(voxel);
+  }
+  {
+    Extremum<1, Energy> voids(tile, instructions);
+    Extremum<-1, Energy> clusters(tile, instructions);
+    while (true) {
+      const Coord from = clusters.find();
+      clear(from);
+      voids.follow(kernel, from, -1);
+      clusters.follow(kernel, from, -1);
+      const Coord to = voids.find();
+      set(to);
+      if (to == from) break;
+      voids.follow(kernel, to, 1);
+      clusters.follow(kernel, to, 1);
+    }
+  }
+  std::vector<std::uint32_t> ranks(count);
+  const std::vector<Energy> converged = tile.energies();
+  Extremum<-1, Energy> clusters(tile, instructions);
+  for (std::uint32_t rank = initial; rank-- > 0;) {
+    const Coord voxel = clusters.find();
+    ranks[Bricks::index(voxel, settings.size)] = rank;
+    clear(voxel);
+    clusters.follow(kernel, voxel, -1);
+    work.step();
+  }
+  tile.energies() = converged;
+  Extremum<1, Energy> voids(tile, instructions);
+  for (std::uint32_t rank = initial; rank < count; ++rank) {
+    const Coord voxel = voids.find();
+    ranks[Bricks::index(voxel, settings.size)] = rank;
+    set(voxel);
+    voids.follow(kernel, voxel, 1);
+  }
+  return ranks;
+}
+
+bool isSmall(const Coord& size) { return Bricks(size).voxels() <= 32768; }
 
 std::uint64_t nextRandom(std::uint64_t& state) {  // SplitMix64
   std::uint64_t z = (state += 0x9e3779b97f4a7c15u);
@@ -318,86 +503,15 @@ std::uint32_t initialCount(std::uint32_t count) {
   return std::max(1u, std::min((count - 1) / 2, count / 10));
 }
 
-double smallestWeight(const VoidAndCluster& settings) {
-  const openvdb::Coord& size = settings.size;
-  if (static_cast<std::size_t>(size.x()) * size.y() * size.z() <= 32768) return 0;
-  return std::ldexp(1.0, settings.kernel.shape == MaskKernel::Shape::peters ? -16 : -40);
+double smallestWeight(const openvdb::Coord& size) {
+  return isSmall(size) ? 0 : std::ldexp(1.0, -14);
 }
 
 std::vector<std::uint32_t> voidAndCluster(const VoidAndCluster& settings,
                                           const std::function<void(double fraction)>& progress,
                                           InstructionSet instructions) {
-  const auto count =
-      static_cast<std::uint32_t>(settings.size.x()) * settings.size.y() * settings.size.z();
-  const std::uint32_t initial = initialCount(count);
-  const std::vector<std::uint32_t> ties = randomPermutation(count, settings.seed);
-  const IntegerKernel kernel = integerKernel(settings, bitsFor(count));
-
-  Tile tile(settings.size);
-  const auto index = [&](const openvdb::Coord& voxel) {
-    return voxel.x() +
-           static_cast<std::size_t>(settings.size.x()) * tile.lineIndex(voxel.y(), voxel.z());
-  };
-  const auto set = [&](const openvdb::Coord& voxel) {
-    loops<1>(instructions).deposit(tile, kernel, voxel);
-    tile.at(voxel) += set_bias;
-  };
-  const auto clear = [&](const openvdb::Coord& voxel) {
-    loops<-1>(instructions).deposit(tile, kernel, voxel);
-    tile.at(voxel) -= set_bias;
-  };
-  Progress work(progress, count + 1.4 * initial);
-
-  std::uint32_t i = 0;
-  for (int z = 0; z < settings.size.z(); ++z) {
-    for (int y = 0; y < settings.size.y(); ++y) {
-      for (int x = 0; x < settings.size.x(); ++x) tile.at({x, y, z}) += ties[i++];
-    }
-  }
-  i = 0;
-  for (int z = 0; z < settings.size.z(); ++z) {
-    for (int y = 0; y < settings.size.y(); ++y) {
-      for (int x = 0; x < settings.size.x(); ++x) {
-        if (ties[i++] < initial) set({x, y, z});
-      }
-    }
-  }
-  {
-    Extremum<1> voids(tile, instructions);
-    Extremum<-1> clusters(tile, instructions);
-    while (true) {
-      const openvdb::Coord from = clusters.find();
-      clear(from);
-      voids.follow(kernel, from, -1);
-      clusters.follow(kernel, from, -1);
-      const openvdb::Coord to = voids.find();
-      set(to);
-      if (to == from) break;
-      voids.follow(kernel, to, 1);
-      clusters.follow(kernel, to, 1);
-      work.step();
-    }
-  }
-  std::vector<std::uint32_t> ranks(count);
-  const Tile converged = tile;
-  Extremum<-1> clusters(tile, instructions);
-  for (std::uint32_t rank = initial; rank-- > 0;) {
-    const openvdb::Coord at = clusters.find();
-    ranks[index(at)] = rank;
-    clear(at);
-    clusters.follow(kernel, at, -1);
-    work.step();
-  }
-  tile = converged;
-  Extremum<1> voids(tile, instructions);
-  for (std::uint32_t rank = initial; rank < count; ++rank) {
-    const openvdb::Coord at = voids.find();
-    ranks[index(at)] = rank;
-    set(at);
-    voids.follow(kernel, at, 1);
-    work.step();
-  }
-  return ranks;
+  return isSmall(settings.size) ? ranksOf<std::int64_t>(settings, progress, instructions)
+                                : ranksOf<std::int32_t>(settings, progress, instructions);
 }
 
 }  // namespace vdbdither

@@ -1,0 +1,169 @@
+#include <algorithm>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "io/staged_output.h"
+#include "ops/kernels/slice_spectrum.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/find_grid.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+using nlohmann::ordered_json;
+using openvdb::Coord;
+
+class MaskSpectrum : public Sink {
+ public:
+  void declare(Options& options) override {
+    options.positional("file", file_, "JSON file that will hold the spectra.");
+    options.triple("pitch", pitch_mm_, "MM",
+                   "Pitch of the lattice that the mask is meant for; only its proportions count.");
+    options.number("step", step_degrees_, 0.5, 45,
+                   "Step of the facets' polar and azimuthal angle for projections, degrees.");
+    options.number("plane-step", plane_step_degrees_, 0.5, 45, "The same for voxel planes.");
+    options.integer("levels", levels_, 0, 99,
+                    "Thresholded masks are looked at for this many evenly spaced thresholds.");
+    options.flag("overwrite", overwrite_, "Replace a file that is there already.");
+  }
+
+  void plan(const Schema& in) override {
+    findGrid<openvdb::FloatGrid>(in.grids, "mask");
+    box_ = in.lattice.box;
+    if (box_.empty()) throw DataError("there is no mask to look at: the lattice has no voxels");
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(pitch_mm_[axis] > 0)) {
+        throw UsageError("--pitch: " + shortestText(pitch_mm_[axis]) +
+                         " is no pitch; more than 0 mm is");
+      }
+      if (box_.dim()[axis] > 256) {
+        throw DataError("the mask is " + std::to_string(box_.dim()[axis]) +
+                        " voxels long; tiles of up to 256 are looked at");
+      }
+    }
+    StagedOutput::check(file_, StagedOutput::Kind::file, overwrite_);
+    values_.assign(box_.volume(), 0.0f);
+  }
+
+  [[nodiscard]] double memoryBytes() const override {
+    return static_cast<double>(box_.volume()) * (4 + 16 + 8.0 * (levels_ + 1));
+  }
+
+  void write(const Slab& in) override {
+    const auto grid = findGrid<openvdb::FloatGrid>(in.grids, "mask");
+    if (!metadata_) metadata_ = grid->copyMeta();
+    for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel) {
+      openvdb::CoordBBox where;
+      voxel.getBoundingBox(where);
+      where.intersect(box_);
+      for (auto at = where.begin(); at; ++at) {
+        if (in.core.contains((*at).z())) values_[index(*at)] = *voxel;
+      }
+    }
+  }
+
+  void finish() override {
+    if (!metadata_) throw DataError("no layer of a mask came");
+    const std::string text = spectra().dump(1) + "\n";
+    StagedOutput output(file_, StagedOutput::Kind::file);
+    writeFile(output.path(), {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
+              file_);
+    output.commit();
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(const Coord& at) const {
+    const Coord size = box_.dim();
+    const Coord from = at - box_.min();
+    return from.x() + static_cast<std::size_t>(size.x()) *
+                          (from.y() + static_cast<std::size_t>(size.y()) * from.z());
+  }
+
+  /// The mask itself, then thresholded.
+  [[nodiscard]] std::vector<PowerSpectrum> powerSpectra() const {
+    const auto [least, greatest] = std::minmax_element(values_.begin(), values_.end());
+    if (*least == *greatest) throw DataError("the mask is constant: it has no spectrum");
+    std::vector<PowerSpectrum> spectra{powerSpectrum(values_, box_.dim())};
+    for (int level = 1; level <= levels_; ++level) {
+      std::vector<float> above;
+      for (const float value : values_) above.push_back(value > kappa(level) ? 1.0f : 0.0f);
+      spectra.push_back(powerSpectrum(above, box_.dim()));
+    }
+    return spectra;
+  }
+
+  [[nodiscard]] double kappa(int level) const { return static_cast<double>(level) / (levels_ + 1); }
+
+  static ordered_json json(const FacetSummary& facets) {
+    return {{"mean", facets.mean},
+            {"greatest", facets.greatest},
+            {"low_mean", facets.low_mean},
+            {"low_worst", facets.low_worst},
+            {"worst_normal",
+             {facets.worst_normal.x(), facets.worst_normal.y(), facets.worst_normal.z()}}};
+  }
+
+  [[nodiscard]] ordered_json spectra() const {
+    const std::vector<PowerSpectrum> power = powerSpectra();
+    const SliceSpectra projections(power, pitch_mm_, SliceModel::projection);
+    const SliceSpectra planes(power, pitch_mm_, SliceModel::voxel_plane);
+    const auto part = [this](double begin, double end) {
+      return [this, begin, end](double fraction) {
+        report().progress(begin + (end - begin) * fraction);
+      };
+    };
+    const auto projected = summary(projections, normalsOfHalfSphere(step_degrees_), part(0, 0.5));
+    const auto printed = summary(planes, normalsOfHalfSphere(plane_step_degrees_), part(0.5, 0.9));
+    const auto near_axes = summary(planes, normalsNearAxes(), part(0.9, 1));
+
+    ordered_json result;
+    const Coord size = box_.dim();
+    result["size"] = {size.x(), size.y(), size.z()};
+    for (auto item = metadata_->beginMeta(); item != metadata_->endMeta(); ++item) {
+      if (item->first.rfind("mask:", 0) == 0) result[item->first] = item->second->str();
+    }
+    result["pitch_mm"] = {pitch_mm_.x(), pitch_mm_.y(), pitch_mm_.z()};
+    result["step_degrees"] = step_degrees_;
+    result["plane_step_degrees"] = plane_step_degrees_;
+    result["bands"] = band_count;
+    result["low_bands"] = low_bands;
+    for (int level = 0; level <= levels_; ++level) {
+      ordered_json of{{"projection", json(projected[level])},
+                      {"voxel_plane", json(printed[level])},
+                      {"voxel_plane_near_axes", json(near_axes[level])}};
+      if (level == 0) {
+        result["grey"] = of;
+      } else {
+        of["kappa"] = kappa(level);
+        result["thresholded"].push_back(of);
+      }
+    }
+    return result;
+  }
+
+  std::string file_;
+  openvdb::Vec3d pitch_mm_{1, 1, 1};
+  double step_degrees_ = 1;
+  double plane_step_degrees_ = 5;
+  int levels_ = 9;
+  bool overwrite_ = false;
+  openvdb::CoordBBox box_;
+  openvdb::MetaMap::Ptr metadata_;
+  std::vector<float> values_;
+};
+
+}  // namespace
+
+extern const OperatorInfo mask_spectrum{
+    "mask-spectrum", "Measures the spectra of the planar slices of a mask",
+    "mask --size 16 ! mask-spectrum --step 10 --plane-step 15 mask.json",
+    []() -> std::unique_ptr<Operator> { return std::make_unique<MaskSpectrum>(); }};
+
+}  // namespace vdbdither
