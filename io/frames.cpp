@@ -8,8 +8,6 @@
 #include <unistd.h>
 #include <vector>
 
-#include <openvdb/io/Stream.h>
-
 #include "io/archive_digest.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
@@ -52,9 +50,7 @@ void FrameWriter::send(const VdbContents& contents) {
   }
 }
 
-/// Reads a descriptor and digests what is consumed. OpenVDB leaves the position behind its archive,
-/// so the next one begins where it stopped; each is read through an istream of its own (a reused
-/// one fails on the second archive).
+/// Reads a descriptor.
 class FrameReader::Buffer : public std::streambuf {
  public:
   Buffer(int descriptor, const std::string& where)
@@ -62,39 +58,38 @@ class FrameReader::Buffer : public std::streambuf {
     setg(bytes_.data(), bytes_.data(), bytes_.data());
   }
 
-  /// Makes the header of the next archive ready. False at the end of the pipe.
-  bool begin() {
-    digest_ = {};
+  /// The UUID of the archive that comes next, which is not taken off; less where the pipe ends
+  /// before, and nothing at its end.
+  std::optional<std::string_view> peekUuid() {
     // The unread rest moves to the front, so that the header lies in one piece.
     const std::size_t rest = egptr() - gptr();
     std::memmove(bytes_.data(), gptr(), rest);
     setg(bytes_.data(), bytes_.data(), bytes_.data() + rest);
-    digested_ = gptr();
     while (static_cast<std::size_t>(egptr() - gptr()) < uuid_offset + uuid_size) {
       const std::size_t count = fill(egptr());
       if (count == 0) break;
       setg(eback(), gptr(), egptr() + count);
     }
-    if (gptr() == egptr()) return false;
-    if (static_cast<std::size_t>(egptr() - gptr()) >= uuid_offset + uuid_size) {
-      uuid_.assign(gptr() + uuid_offset, uuid_size);
-      neutral_uuid.copy(gptr() + uuid_offset, uuid_size);
-    }
-    return true;
+    if (gptr() == egptr()) return std::nullopt;
+    const std::string_view header(gptr(), egptr() - gptr());
+    return header.substr(std::min(uuid_offset, header.size()), uuid_size);
   }
 
-  /// Whether what was consumed since `begin` is what its digest says; true where it carries none.
-  bool intact() {
-    digestConsumed();
-    return !isDigestUuid(uuid_) || uuid_ == uuidOf(digest_.finish());
+  /// Takes `size` bytes; fewer where the pipe ends before.
+  std::string take(std::uint64_t size) {
+    std::string taken;
+    while (taken.size() < size && sgetc() != traits_type::eof()) {
+      const std::size_t count = std::min<std::uint64_t>(size - taken.size(), egptr() - gptr());
+      taken.append(gptr(), count);
+      setg(eback(), gptr() + count, egptr());
+    }
+    return taken;
   }
 
  protected:
   int_type underflow() override {
-    digestConsumed();
     const std::size_t count = fill(bytes_.data());
     setg(bytes_.data(), bytes_.data(), bytes_.data() + count);
-    digested_ = gptr();
     return count ? traits_type::to_int_type(*gptr()) : traits_type::eof();
   }
 
@@ -107,17 +102,9 @@ class FrameReader::Buffer : public std::streambuf {
     }
   }
 
-  void digestConsumed() {
-    digest_.update(digested_, gptr() - digested_);
-    digested_ = gptr();
-  }
-
   int descriptor_;
   std::string where_;
   std::vector<char> bytes_;
-  char* digested_ = nullptr;
-  Digest digest_;
-  std::string uuid_;
 };
 
 FrameReader::FrameReader(int descriptor, std::string where)
@@ -134,23 +121,30 @@ FrameReader::FrameReader(int descriptor, std::string where)
 FrameReader::~FrameReader() = default;
 
 VdbContents FrameReader::receive() {
-  if (!buffer_->begin()) {
+  const std::optional<std::string_view> uuid = buffer_->peekUuid();
+  const bool digested = uuid && isDigestUuid(*uuid);
+  if (!uuid) {
     throw DataError(
         framed_ ? where_ + " ended before its closing frame: the run upstream failed or was stopped"
                 : where_ + " is empty: the run upstream failed, or nothing was piped in");
   }
-  VdbContents contents;
+  if (framed_ && !digested) throw DataError(where_ + " is damaged: what follows is no frame");
   try {
-    std::istream stream(buffer_.get());
-    stream.exceptions(std::ios::badbit);
-    openvdb::io::Stream archive(stream, false);
-    contents = contentsOf(archive);
-  } catch (const openvdb::Exception& error) {
+    if (!digested) {
+      std::istream stream(buffer_.get());
+      return readArchive(stream);
+    }
+    const std::string expected(*uuid);
+    std::string bytes = buffer_->take(sizeIn(expected));
+    if (bytes.size() < sizeIn(expected)) {
+      throw DataError("it ends within a frame: the run upstream failed or was stopped");
+    }
+    if (uuidOf(bytes) != expected) throw DataError("the checksum of a frame does not match");
+    std::istringstream stream(std::move(bytes), std::ios::binary);
+    return readArchive(stream);
+  } catch (const DataError& error) {
     throw DataError(where_ + " is not a readable VDB stream: " + error.what());
   }
-  if (!buffer_->intact())
-    throw DataError(where_ + " is damaged: the checksum of a frame does not match");
-  return contents;
 }
 
 std::optional<Slab> FrameReader::next() {

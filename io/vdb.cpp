@@ -8,7 +8,6 @@
 #include <span>
 #include <sstream>
 
-#include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 
 #include "io/archive_digest.h"
@@ -63,10 +62,11 @@ class StreamArchive : public openvdb::io::Archive {
   openvdb::MetaMap metadata_;
 };
 
-/// Reads `stream` to its end. Returns the digest of all but the UUID, as a UUID, and the UUID that
-/// is there.
+/// Reads `stream` to its end. Returns the UUID that the archive should have, and the one that is
+/// there.
 std::pair<std::string, std::string> digestAndUuid(std::istream& stream) {
   Digest digest;
+  std::uint64_t total = 0;
   std::string uuid;
   std::vector<char> buffer(1 << 20);
   while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())),
@@ -77,8 +77,9 @@ std::pair<std::string, std::string> digestAndUuid(std::istream& stream) {
       neutral_uuid.copy(buffer.data() + uuid_offset, uuid_size);
     }
     digest.update(buffer.data(), size);
+    total += size;
   }
-  return {uuidOf(digest.finish()), uuid};
+  return {uuidOf(digest.finish(), total), uuid};
 }
 
 std::string quoted(const std::filesystem::path& path) { return "'" + path.string() + "'"; }
@@ -104,22 +105,6 @@ VdbContents collected(const openvdb::GridPtrVec& grids, const openvdb::MetaMap& 
     contents.metadata[entry->first] = entry->second->str();
   }
   return contents;
-}
-
-/// Opens and reads with `read`, its failures told as DataError.
-template <typename ReadFile>
-VdbContents readFile(const std::filesystem::path& path, const ReadFile& read) {
-  std::error_code none;
-  if (!std::filesystem::exists(path, none)) throw DataError("no such file " + quoted(path));
-  if (!std::filesystem::is_regular_file(path, none))
-    throw DataError(quoted(path) + " is not a file");
-  try {
-    openvdb::io::File file(path.string());
-    file.open(false);
-    return read(file);
-  } catch (const openvdb::Exception& error) {
-    throw DataError(quoted(path) + " is not a readable VDB file: " + error.what());
-  }
 }
 
 std::string boxText(const CoordBBox& box) {
@@ -161,8 +146,10 @@ Lattice latticeOf(const GridBase& grid, const std::string& where) {
 
 }  // namespace
 
-std::string uuidOf(const Digest::Value& value) {
-  std::string hex = hexText(value).substr(0, 32);
+std::string uuidOf(const Digest::Value& value, std::uint64_t size) {
+  std::array<char, 13> digits{};
+  std::snprintf(digits.data(), digits.size(), "%012llx", static_cast<unsigned long long>(size));
+  std::string hex = hexText(value).substr(0, 20) + digits.data();
   hex[12] = '8';
   hex[16] = 'a';
   return hex.substr(0, 8) + "-" + hex.substr(8, 4) + "-" + hex.substr(12, 4) + "-" +
@@ -173,10 +160,31 @@ bool isDigestUuid(std::string_view uuid) {
   return uuid.size() == uuid_size && uuid[14] == '8' && uuid[19] == 'a';
 }
 
-VdbContents contentsOf(openvdb::io::Stream& archive) {
-  const openvdb::GridPtrVecPtr grids = archive.getGrids();
-  for (const GridBase::Ptr& grid : *grids) dropFileStatistics(*grid);
-  return collected(*grids, *archive.getMetadata());
+std::uint64_t sizeIn(std::string_view digest_uuid) {
+  return std::strtoull(std::string(digest_uuid.substr(24)).c_str(), nullptr, 16);
+}
+
+std::string uuidOf(std::string_view archive) {
+  Digest digest;
+  digest.update(archive.data(), uuid_offset);
+  digest.update(neutral_uuid.data(), uuid_size);
+  digest.update(archive.data() + uuid_offset + uuid_size, archive.size() - uuid_offset - uuid_size);
+  return uuidOf(digest.finish(), archive.size());
+}
+
+VdbContents readArchive(std::istream& stream) {
+  // A read that comes up short must throw: OpenVDB would go on with whatever is in memory.
+  stream.exceptions(std::ios::badbit | std::ios::failbit);
+  try {
+    openvdb::io::Stream archive(stream, false);
+    const openvdb::GridPtrVecPtr grids = archive.getGrids();
+    for (const GridBase::Ptr& grid : *grids) dropFileStatistics(*grid);
+    return collected(*grids, *archive.getMetadata());
+  } catch (const openvdb::Exception& error) {
+    throw DataError(error.what());
+  } catch (const std::ios::failure&) {
+    throw DataError("it ends too early");
+  }
 }
 
 void initializeVdb() { openvdb::initialize(); }
@@ -185,11 +193,7 @@ std::string archiveBytes(const VdbContents& contents, VdbCodec codec) {
   std::ostringstream stream(std::ios::binary);
   StreamArchive(contents, codec).writeTo(stream, false);
   std::string bytes = std::move(stream).str();
-  neutral_uuid.copy(bytes.data() + uuid_offset, uuid_size);
-  Digest digest;
-  digest.update(bytes.data(), bytes.size());
-  const std::string uuid = uuidOf(digest.finish());
-  std::copy(uuid.begin(), uuid.end(), bytes.begin() + uuid_offset);
+  uuidOf(bytes).copy(bytes.data() + uuid_offset, uuid_size);
   return bytes;
 }
 
@@ -219,24 +223,23 @@ void writeVdb(const std::filesystem::path& path, const VdbContents& contents, Vd
 }
 
 VdbContents readVdb(const std::filesystem::path& path) {
-  VdbContents contents = readFile(path, [](openvdb::io::File& file) {
-    const openvdb::GridPtrVecPtr grids = file.getGrids();
-    for (const GridBase::Ptr& grid : *grids) dropFileStatistics(*grid);
-    return collected(*grids, *file.getMetadata());
-  });
+  std::error_code none;
+  if (!std::filesystem::exists(path, none)) throw DataError("no such file " + quoted(path));
+  if (!std::filesystem::is_regular_file(path, none))
+    throw DataError(quoted(path) + " is not a file");
   std::ifstream file(path, std::ios::binary);
-  const auto [digest, uuid] = digestAndUuid(file);
-  if (isDigestUuid(uuid) && uuid != digest) {
+  if (!file) throw DataError("cannot read " + quoted(path) + ": " + std::strerror(errno));
+  const auto [expected, uuid] = digestAndUuid(file);
+  if (isDigestUuid(uuid) && uuid != expected) {
     throw DataError(quoted(path) + " is damaged: its checksum does not match; make it again");
   }
-  return contents;
-}
-
-VdbContents readVdbHead(const std::filesystem::path& path) {
-  return readFile(path, [](openvdb::io::File& file) {
-    const openvdb::GridPtrVecPtr grids = file.readAllGridMetadata();
-    return collected(*grids, *file.getMetadata());
-  });
+  file.clear();
+  file.seekg(0);
+  try {
+    return readArchive(file);
+  } catch (const DataError& error) {
+    throw DataError(quoted(path) + " is not a readable VDB file: " + error.what());
+  }
 }
 
 GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name) {

@@ -33,9 +33,6 @@ void writeVdb(const std::filesystem::path& path, const VdbContents& contents, Vd
 /// `path`.
 VdbContents readVdb(const std::filesystem::path& path);
 
-/// The same without the voxels: metadata and empty grids of the right type.
-VdbContents readVdbHead(const std::filesystem::path& path);
-
 /// The grid called `name` of a file; any name where the file has only one grid. Throws DataError.
 GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name);
 
