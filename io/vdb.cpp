@@ -9,7 +9,6 @@
 #include <fstream>
 #include <sstream>
 
-#include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 
 #include "io/archive_digest.h"
@@ -101,6 +100,8 @@ class MemoryBuffer : public std::streambuf {
 /// OpenVDB's Stream, not its File: without delayed loading it meets every truncation with an
 /// exception.
 VdbContents readStream(std::istream& stream, const std::string& where) {
+  // A read that comes up short must throw: OpenVDB would go on with whatever is in memory.
+  stream.exceptions(std::ios::badbit | std::ios::failbit);
   try {
     openvdb::io::Stream archive(stream, false);
     const openvdb::GridPtrVecPtr grids = archive.getGrids();
@@ -108,6 +109,8 @@ VdbContents readStream(std::istream& stream, const std::string& where) {
     return collected(*grids, *archive.getMetadata());
   } catch (const openvdb::Exception& error) {
     throw DataError(where + " is not a readable VDB archive: " + error.what());
+  } catch (const std::ios::failure&) {
+    throw DataError(where + " is not a readable VDB archive: it ends too early");
   }
 }
 
@@ -274,18 +277,6 @@ VdbContents readVdb(const std::filesystem::path& path) {
     throw DataError(quoted(path) + " is damaged: its checksum does not match; make it again");
   }
   return readStream(file, quoted(path));
-}
-
-VdbContents readVdbHead(const std::filesystem::path& path) {
-  openArchive(path);
-  try {
-    openvdb::io::File file(path.string());
-    file.open(false);
-    const openvdb::GridPtrVecPtr grids = file.readAllGridMetadata();
-    return collected(*grids, *file.getMetadata());
-  } catch (const openvdb::Exception& error) {
-    throw DataError(quoted(path) + " is not a readable VDB archive: " + error.what());
-  }
 }
 
 GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name) {

@@ -33,13 +33,10 @@ void writeVdb(const std::filesystem::path& path, const VdbContents& contents, Vd
 /// `path`.
 VdbContents readVdb(const std::filesystem::path& path);
 
-/// The same without the voxels: metadata and empty grids of the right type.
-VdbContents readVdbHead(const std::filesystem::path& path);
-
 /// The grid called `name` of a file; any name where the file has only one grid. Throws DataError.
 GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name);
 
-/// The archive as bytes, digest included; and back. `where` names the origin in errors.
+/// The archive as bytes, digest included.
 std::string archiveBytes(const VdbContents& contents, VdbCodec codec);
 
 /// The lattice, printer and history that metadata and transforms state. Files of other tools get

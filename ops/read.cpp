@@ -32,7 +32,11 @@ class ReadOperator : public Source {
       frames_ = std::make_unique<FrameReader>(STDIN_FILENO, "standard input");
       schema = frames_->schema();
     } else {
-      schema = schemaOf(readVdbHead(path_), "'" + path_ + "'");
+      VdbContents contents = readVdb(path_);
+      schema = schemaOf(contents, "'" + path_ + "'");
+      // The file's own box may be smaller than what it holds; every layer counts.
+      constexpr ZRange every{std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};
+      slabs_.push_back({every, every, std::move(contents.grids)});
     }
     keepNamed(schema.grids);
     kept_ = schema.grids;
@@ -41,16 +45,17 @@ class ReadOperator : public Source {
 
   [[nodiscard]] bool isBarrier() const override { return !isPipe(); }
 
+  [[nodiscard]] double memoryBytes() const override {
+    double bytes = 0;
+    for (const Slab& slab : slabs_) {
+      for (const auto& [name, grid] : slab.grids) bytes += sizeOf(grid).bytes;
+    }
+    return bytes;
+  }
+
   [[nodiscard]] Grids run(ZRange core) const override {
     const std::lock_guard lock(mutex_);
-    if (isPipe()) {
-      takeFrames(core);
-    } else if (slabs_.empty()) {
-      const Grids grids = readVdb(path_).grids;
-      slabs_.push_back({{}, {}, grids});
-      // The file's own box may be smaller than what it holds; every layer counts.
-      slabs_.back().core = {std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};
-    }
+    if (isPipe()) takeFrames(core);
     Grids result;
     for (const auto& [name, prototype] : kept_) {
       std::vector<Layers> pieces;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -130,7 +131,7 @@ void runChain(const std::vector<std::string>& words) {
 void runProgram(int argc, char** argv) {
   const std::vector<std::string> words = chainWords(argc, argv);
   if (words.empty()) throw UsageError("no operator; see vdbdither --help");
-  if (words.front() == "--version")
+  if (std::find(words.begin(), words.end(), "--version") != words.end())
     return printData((std::string("vdbdither ") + version + "\n").c_str());
   if (words.front() == "--help" || words.front() == "-h" || words.front() == "help") {
     return printData(words.size() > 1 ? helpOf(findOperator(words[1])).c_str()

@@ -141,7 +141,7 @@ TEST_F(Vdb, AFileOfAnotherToolHasTheBoxOfItsVoxels) {
             contents.grids.at("surface")->evalActiveVoxelBoundingBox());
   openvdb::io::File(folder_.path() / "other.vdb")
       .write(openvdb::GridCPtrVec{contents.grids.at("solid")});
-  EXPECT_EQ(schemaOf(readVdbHead(folder_.path() / "other.vdb"), "it").lattice.box,
+  EXPECT_EQ(schemaOf(readVdb(folder_.path() / "other.vdb"), "it").lattice.box,
             openvdb::CoordBBox({-8, -8, -8}, {7, 7, 7}));
 }
 

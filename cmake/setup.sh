@@ -1,0 +1,62 @@
+# What samples/run.sh and the scripts of tests/ share: Debian's packages, quiet steps, the build. To be sourced.
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+jobs=$(nproc)
+
+# To build the program, and to make and slice the sample.
+program_packages=(build-essential cmake ninja-build libopenvdb-dev libboost-iostreams-dev libtbb-dev
+  zlib1g-dev libopenexr-dev libpng-dev libssl-dev libcli11-dev nlohmann-json3-dev python3)
+# To build and run the tests.
+test_packages=(libgtest-dev libgmock-dev libbenchmark-dev libspng-dev libopenvdb-tools
+  python3-openvdb python3-numpy python3-pil)
+lint_packages=(clang-14 clang-format-14 clang-tidy-14)
+
+# Says what takes long to whom is watching.
+say() {
+  if [ -t 2 ]; then echo "$*" >&2; fi
+}
+
+# Runs a command without a word; shows what it said if it fails.
+quietly() {
+  local log
+  log=$(mktemp)
+  if "$@" >"$log" 2>&1 </dev/null; then
+    rm "$log"
+  else
+    local code=$?
+    cat "$log" >&2
+    rm "$log"
+    echo "failed: $*" >&2
+    return "$code"
+  fi
+}
+
+as_root() {
+  if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi
+}
+
+# Installs those of the packages that are missing.
+install_packages() {
+  local package missing=()
+  for package in "$@"; do
+    dpkg-query --show --showformat='${db:Status-Status}\n' "$package" 2>/dev/null | grep --quiet --line-regexp installed ||
+      missing+=("$package")
+  done
+  if [ ${#missing[@]} = 0 ]; then return; fi
+  say "installing ${missing[*]}"
+  quietly as_root apt-get update
+  quietly as_root env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "${missing[@]}"
+}
+
+# Builds Release: the given targets, or everything. Tests are configured only where they are asked for.
+build_release() {
+  say "building in $root/build/release (minutes the first time)"
+  if [ $# = 0 ]; then
+    (cd "$root" && quietly cmake --preset release -DBUILD_TESTING=ON && quietly cmake --build --preset release)
+  else
+    if [ ! -f "$root/build/release/build.ninja" ]; then
+      (cd "$root" && quietly cmake --preset release -DBUILD_TESTING=OFF)
+    fi
+    (cd "$root" && quietly cmake --build --preset release --target "$@")
+  fi
+}

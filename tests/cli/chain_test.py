@@ -1,0 +1,85 @@
+"""A chain gives the same slices however it is run."""
+
+import itertools
+import os
+import pathlib
+import unittest
+
+import meshes
+import stack
+from program import ProgramTest
+
+
+class Chain(ProgramTest):
+    def chain(self, printer, mesh, arguments=""):
+        """The main chain, its stages written apart."""
+        return [f"mesh2sdf {mesh} --printer {printer} {arguments}", "normals", "dither", "material-assign"]
+
+    def sums(self, line):
+        """The SHA-256 of every slice that a line of bash writes into the folder `out`."""
+        self.shell(f"rm -rf out && {line}")
+        return stack.sums(self.folder / "out")
+
+    def ways(self, stages, slab, threads):
+        """Lines of bash that write the same slices into the folder `out`."""
+        common = f"--slab {slab} --threads {threads}"
+        export = f"slice-export out {common}"
+        each = [f"{stage} {common}" for stage in stages]
+        return {
+            "fused": f"vdbdither {' ! '.join(stages)} ! {export}",
+            "quoted": f"vdbdither run '{' | '.join(stages)} | {export}'",
+            "piped": " | ".join([*each, export]),
+            "by files": f"{each[0]} -o a.vdb --overwrite && {each[1]} -i a.vdb -o b.vdb --overwrite && "
+                        f"{each[2]} -i b.vdb -o c.vdb --overwrite && {each[3]} -i c.vdb -o d.vdb --overwrite && "
+                        f"{export} -i d.vdb",
+            "archived on the way": f"vdbdither {stages[0]} ! write s.vdb --overwrite ! "
+                                   f"{' ! '.join(stages[1:])} ! {export} && rm -r out && "
+                                   f"vdbdither read s.vdb ! {' ! '.join(stages[1:])} ! {export}",
+        }
+
+    def assert_all_agree(self, stages, settings):
+        """Returns the sums that every way gives with every slab height and count of threads of `settings`."""
+        reference = None
+        for slab, threads in settings:
+            for way, line in self.ways(stages, slab, threads).items():
+                with self.subTest(way=way, slab=slab, threads=threads):
+                    sums = self.sums(line)
+                    reference = reference or sums
+                    self.assertEqual(sums, reference)
+        return reference
+
+    def assert_every_way_gives_the_same_on(self, printer):
+        meshes.write_stl(self.folder / "part.stl", meshes.turned(meshes.box((1.4, 2.2, 1.1), (0.3, -1, -0.7)), 20, 35))
+        slices = self.assert_all_agree(self.chain(printer, "part.stl"), (("8", 2), ("64", 1), ("all", 2)))
+        stack.check(self.folder / "out")
+        self.assertGreater(len(set(slices)), 30)
+
+    def test_fused_piped_and_filed_runs_of_any_slab_and_threads_agree_on_mimaki(self):
+        self.assert_every_way_gives_the_same_on("mimaki-3duj-553")
+
+    def test_fused_piped_and_filed_runs_of_any_slab_and_threads_agree_on_stratasys(self):
+        self.assert_every_way_gives_the_same_on("stratasys-j750-27um")
+
+    def test_a_layer_range_gives_exactly_those_slices(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(1.2))
+        stages = " ! ".join(self.chain("mimaki-3duj-553", "part.stl"))
+        whole = self.sums(f"vdbdither {stages} ! slice-export out")
+        for begin, end in ((0, 1), (13, 45), (32, 40), (len(whole) - 3, len(whole))):
+            part = self.sums(f"vdbdither {stages} ! slice-export out --layers {begin}:{end}")
+            self.assertEqual(part, whole[begin:end], (begin, end))
+            # Who has all layers that he wants leaves the pipe; `cat` takes the rest.
+            piped = self.sums(f"{stages.replace('!', '|')} | {{ slice-export out --layers {begin}:{end} && cat >/dev/null; }}")
+            self.assertEqual(piped, whole[begin:end], (begin, end))
+
+    @unittest.skipUnless("VDBDITHER_MODELS" in os.environ, "VDBDITHER_MODELS names no folder of models")
+    def test_every_way_agrees_on_a_scan_of_40_mm(self):
+        mesh = pathlib.Path(os.environ["VDBDITHER_MODELS"]) / "classic/armadillo.obj"
+        for printer in ("mimaki-3duj-553", "stratasys-j750-27um"):
+            with self.subTest(printer=printer):
+                slices = self.assert_all_agree(self.chain(printer, mesh, "--fit 40"),
+                                               itertools.product(("8", "64", "all"), (1, 2)))
+                self.assertGreater(len(set(slices)), 1000)
+
+
+if __name__ == "__main__":
+    unittest.main()

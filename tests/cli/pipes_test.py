@@ -1,0 +1,168 @@
+"""What happens when a pipe, a file, a disk or the user lets the program down."""
+
+import random
+import signal
+import subprocess
+import time
+import unittest
+
+import meshes
+from program import MIMAKI, ProgramTest
+
+
+class Damage(ProgramTest):
+    """Frames and files that were cut short or changed on their way."""
+
+    def setUp(self):
+        super().setUp()
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.6))
+        self.frames = self.succeed("mesh2sdf", "part.stl", *MIMAKI, "--slab", "16")
+        self.succeed("mesh2sdf", "part.stl", *MIMAKI, "-o", "surface.vdb")
+        self.file = (self.folder / "surface.vdb").read_bytes()
+        self.archives = self.beginnings(self.frames)
+        self.assertGreater(len(self.archives), 4)
+        self.random = random.Random(1)
+
+    @staticmethod
+    def beginnings(frames):
+        """Where the archives of a pipe begin."""
+        magic, at, found = frames[:8], 0, []
+        while at >= 0:
+            found.append(at)
+            at = frames.find(magic, at + 1)
+        return found
+
+    def refuse_frames(self, frames, *messages):
+        done = self.refuse(1, "standard input", "normals", "-o", "out.vdb", input=frames)
+        said = done.stderr.decode()
+        self.assertTrue(any(message in said for message in messages or ("",)), said)
+
+    def refuse_file(self, content):
+        (self.folder / "spoilt.vdb").write_bytes(content)
+        self.refuse(1, "'spoilt.vdb'", "normals", "-i", "spoilt.vdb", "-o", "out.vdb")
+
+    def test_an_empty_pipe_is_an_error(self):
+        self.refuse_frames(b"", "is empty: the run upstream failed, or nothing was piped in")
+
+    def test_a_pipe_without_its_closing_frame_is_an_error(self):
+        for end in self.archives[1:]:
+            self.refuse_frames(self.frames[:end], "ended before its closing frame")
+
+    def test_a_pipe_cut_anywhere_is_an_error(self):
+        cuts = [1, 20, 60, *(end + self.random.randrange(-200, 200) for end in self.archives[1:]), len(self.frames) - 1]
+        for cut in cuts:
+            self.refuse_frames(self.frames[:cut])
+
+    def test_a_lost_or_doubled_frame_is_an_error(self):
+        first, second, third = self.archives[1:4]
+        self.refuse_frames(self.frames[:first] + self.frames[second:])
+        self.refuse_frames(self.frames[:third] + self.frames[second:])
+        self.refuse_frames(self.frames[first:])
+
+    def test_a_flipped_bit_in_a_pipe_is_found(self):
+        for _ in range(24):
+            spoilt = bytearray(self.frames)
+            spoilt[self.random.randrange(len(spoilt))] ^= 1 << self.random.randrange(8)
+            self.refuse_frames(bytes(spoilt))
+
+    def test_what_is_no_vdb_is_refused(self):
+        for text in (b"hello\n", bytes(5000), self.random.randbytes(5000)):
+            self.refuse_frames(text)
+
+    def test_a_file_cut_anywhere_is_an_error(self):
+        for cut in (0, 1, 20, 60, 1000, len(self.file) // 2, len(self.file) - 1):
+            self.refuse_file(self.file[:cut])
+
+    def test_a_flipped_bit_in_a_file_is_found(self):
+        for _ in range(24):
+            spoilt = bytearray(self.file)
+            spoilt[self.random.randrange(len(spoilt))] ^= 1 << self.random.randrange(8)
+            self.refuse_file(bytes(spoilt))
+
+
+class Stops(ProgramTest):
+    """Runs that end before their time leave nothing behind."""
+
+    def setUp(self):
+        super().setUp()
+        meshes.write_stl(self.folder / "tall.stl", meshes.cylinder(5, 60))
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.6))
+        self.inputs = self.listing()
+
+    def chain(self):
+        return ["mesh2sdf", "tall.stl", *MIMAKI, "--slab", "8", "!", "normals", "!", "dither", "!", "slice-export", "out"]
+
+    def wait_for_slices(self, process):
+        """Waits until a stack is begun."""
+        deadline = time.monotonic() + 60
+        while not any(path.suffix == ".png" for path in self.folder.rglob("*")):
+            self.assertIsNone(process.poll())
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.01)
+
+    def test_interrupt_and_termination_leave_nothing(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            process = self.start(*self.chain())
+            self.wait_for_slices(process)
+            process.send_signal(number)
+            said = process.communicate()[1].decode()
+            self.assertEqual(process.returncode, 128 + number)
+            self.assertRegex(said, r"^vdbdither .*stopped: \w+\n$")
+            self.assertEqual(self.listing(), self.inputs)
+
+    def test_what_a_killed_run_left_is_cleared_by_the_next(self):
+        process = self.start(*self.chain())
+        self.wait_for_slices(process)
+        process.kill()
+        process.wait()
+        self.assertNotEqual(self.listing(), self.inputs)
+        self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "out")
+        self.assertEqual([path.name for path in self.folder.iterdir() if path.name.startswith(".")], [])
+
+    def test_a_killed_run_upstream_fails_the_run_downstream(self):
+        upstream = self.start("mesh2sdf", "tall.stl", *MIMAKI, "--slab", "8", stderr=None)
+        downstream = self.start("dither", "!", "slice-export", "out", stdin=upstream.stdout)
+        self.wait_for_slices(downstream)
+        upstream.kill()
+        said = downstream.communicate()[1].decode()
+        self.assertEqual(downstream.returncode, 1)
+        self.assertRegex(said, r"^vdbdither read: standard input .*\n$")
+        self.assertEqual(self.listing(), self.inputs)
+
+    def test_a_reader_that_leaves_is_an_error_and_no_crash(self):
+        process = self.start("mesh2sdf", "tall.stl", *MIMAKI, "--slab", "8")
+        self.assertEqual(len(process.stdout.read(1000)), 1000)
+        process.stdout.close()
+        said = process.stderr.read().decode()
+        self.assertEqual(process.wait(), 1)
+        self.assertEqual(said, "vdbdither write: the reader of the pipe has gone\n")
+
+    def test_a_full_disk_under_standard_output_is_told(self):
+        with open("/dev/full", "wb") as full:
+            self.refuse(1, "No space left on device", "mesh2sdf", "part.stl", *MIMAKI, stdout=full)
+            self.refuse(1, "No space left on device", "--help", stdout=full)
+
+    def test_a_full_disk_leaves_nothing(self):
+        disk = self.folder / "disk"
+        disk.mkdir()
+        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], capture_output=True)
+        if mounted.returncode != 0:
+            self.skipTest("a small disk can be mounted only by root")
+        self.addCleanup(subprocess.run, ["umount", disk], check=True)
+        self.refuse(1, "'disk/a.vdb': No space left on device", "mesh2sdf", "part.stl", *MIMAKI, "-o", "disk/a.vdb")
+        self.refuse(1, "No space left on device", "mesh2sdf", "tall.stl", *MIMAKI, "!", "dither", "!", "slice-export", "disk/out")
+
+    def test_an_output_is_replaced_only_when_the_new_one_is_whole(self):
+        self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "out")
+        before = self.listing()
+        process = self.start(*self.chain(), "--overwrite")
+        deadline = time.monotonic() + 60
+        while self.listing() == before:
+            self.assertLess(time.monotonic(), deadline)
+        process.send_signal(signal.SIGINT)
+        process.communicate()
+        self.assertEqual(self.listing(), before)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,11 @@
+#!/usr/bin/env bash
+# Builds everything and runs every test. Arguments go to ctest: tests/run.sh -R cli
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/../cmake/setup.sh"
+
+install_packages "${program_packages[@]}" "${test_packages[@]}"
+build_release
+
+# Tests that pass are not worth a line each.
+cd "$root"
+ctest --preset release --parallel "$jobs" "$@" </dev/null | grep --extended-regexp --invert-match '^ +Start |  Passed '

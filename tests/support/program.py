@@ -1,0 +1,69 @@
+"""Runs the built program as a user does."""
+
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = pathlib.Path(os.environ.get("VDBDITHER_PROGRAM", ROOT / "build/release/vdbdither")).resolve()
+
+MIMAKI = ("--printer", "mimaki-3duj-553")
+
+
+class ProgramTest(unittest.TestCase):
+    """A test with an empty folder of its own, in which the program runs."""
+
+    def setUp(self):
+        holder = tempfile.TemporaryDirectory(prefix="vdbdither-test-")
+        self.addCleanup(holder.cleanup)
+        self.folder = pathlib.Path(holder.name)
+
+    def environment(self):
+        """With the program and the links named like operators on the PATH."""
+        return {**os.environ, "PATH": f"{PROGRAM.parent}:{PROGRAM.parent / 'operators'}:{os.environ['PATH']}"}
+
+    def start(self, *arguments, **keywords):
+        keywords = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **keywords}
+        process = subprocess.Popen([PROGRAM, *map(str, arguments)], cwd=self.folder, **keywords)
+        self.addCleanup(process.__exit__, None, None, None)
+        self.addCleanup(process.kill)
+        return process
+
+    def run_program(self, *arguments, program=PROGRAM, **keywords):
+        """The finished process. Standard output and error are bytes."""
+        keywords = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": 120, **keywords}
+        if "input" not in keywords:
+            keywords.setdefault("stdin", subprocess.DEVNULL)
+        return subprocess.run([program, *map(str, arguments)], cwd=self.folder, **keywords)
+
+    def succeed(self, *arguments, **keywords):
+        """Standard output of a run that ends well and says nothing."""
+        done = self.run_program(*arguments, **keywords)
+        self.assertEqual((done.returncode, done.stderr), (0, b""), arguments)
+        return done.stdout
+
+    def shell(self, line):
+        """The same for a line of bash, in which every part of a pipe must end well."""
+        done = subprocess.run(["bash", "-o", "pipefail", "-c", line], cwd=self.folder, env=self.environment(),
+                              stdin=subprocess.DEVNULL, capture_output=True, timeout=120)
+        self.assertEqual((done.returncode, done.stderr), (0, b""), line)
+        return done.stdout
+
+    def refuse(self, code, message, *arguments, **keywords):
+        """A run that ends with `code` and one line that holds `message`, and leaves the folder as it was."""
+        before = self.listing()
+        done = self.run_program(*arguments, **keywords)
+        said = done.stderr.decode()
+        self.assertEqual(done.returncode, code, (arguments, said))
+        self.assertIn(message, said)
+        self.assertEqual(said.count("\n"), 1, said)
+        self.assertTrue(said.startswith("vdbdither "), said)
+        self.assertFalse(said.endswith(".\n"), said)
+        self.assertEqual(self.listing(), before)
+        return done
+
+    def listing(self):
+        """Everything in the folder with its size, hidden files too."""
+        return sorted((str(path.relative_to(self.folder)), path.stat().st_size) for path in self.folder.rglob("*"))
