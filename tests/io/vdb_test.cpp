@@ -17,8 +17,8 @@ using test::TemporaryFolder;
 
 VdbContents sample() {
   const auto surface = openvdb::FloatGrid::create(0.2F);
-  surface->setTransform(openvdb::math::Transform::createLinearTransform(
-      openvdb::math::Mat4d(0.042, 0., 0., 0., 0., 0.084, 0., 0., 0., 0., 0.022, 0., 0., -0.021, 0., 1.)));
+  surface->setTransform(openvdb::math::Transform::createLinearTransform(openvdb::math::Mat4d(
+      0.042, 0., 0., 0., 0., 0.084, 0., 0., 0., 0., 0.022, 0., 0., -0.021, 0., 1.)));
   surface->setGridClass(openvdb::GRID_LEVEL_SET);
   std::mt19937 random(3);
   std::uniform_int_distribution<int> at(-30, 30);
