@@ -6,19 +6,19 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 
 namespace vdbdither {
 namespace {
 
-using test::TemporaryFolder;
+using test::ScratchFolder;
 
 VdbContents sample() {
   const auto surface = openvdb::FloatGrid::create(0.2F);
-  surface->setTransform(openvdb::math::Transform::createLinearTransform(
-      openvdb::math::Mat4d(0.042, 0., 0., 0., 0., 0.084, 0., 0., 0., 0., 0.022, 0., 0., -0.021, 0., 1.)));
+  surface->setTransform(openvdb::math::Transform::createLinearTransform(openvdb::math::Mat4d(
+      0.042, 0., 0., 0., 0., 0.084, 0., 0., 0., 0., 0.022, 0., 0., -0.021, 0., 1.)));
   surface->setGridClass(openvdb::GRID_LEVEL_SET);
   std::mt19937 random(3);
   std::uniform_int_distribution<int> at(-30, 30);
@@ -59,7 +59,7 @@ class Vdb : public testing::Test {
  protected:
   void SetUp() override { initializeVdb(); }
 
-  TemporaryFolder folder_;
+  ScratchFolder folder_;
 };
 
 TEST_F(Vdb, WhatWasWrittenReadsBack) {
