@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <mutex>
 #include <unistd.h>
 #include <vector>
@@ -82,6 +83,16 @@ class ReadOperator : public Source {
     }
     // The closing frame must be seen before anything downstream is published.
     if (core.end >= frames_->schema().lattice.layers().end && !ended_) ended_ = !frames_->next();
+    int covered = core.begin;
+    for (const Slab& slab : slabs_) {
+      if (slab.core.begin <= covered) covered = std::max(covered, slab.core.end);
+    }
+    if (covered < core.end) {
+      throw DataError("standard input lacks layer " +
+                      std::to_string(covered - frames_->schema().lattice.layers().begin) +
+                      "; where only some layers are wanted, give --layers to the last operator of "
+                      "the pipe alone");
+    }
   }
 
   void keepNamed(Grids& grids) const {

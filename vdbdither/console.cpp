@@ -1,6 +1,7 @@
 #include "vdbdither/console.h"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <unistd.h>
 
@@ -9,7 +10,7 @@ namespace vdbdither {
 namespace {
 
 std::string clockText(double seconds) {
-  const int whole = static_cast<int>(seconds + 0.5);
+  const int whole = static_cast<int>(std::lround(seconds));
   std::array<char, 32> text{};
   if (whole < 3600) {
     std::snprintf(text.data(), text.size(), "%d:%02d", whole / 60, whole % 60);

@@ -106,16 +106,16 @@ class Pipeline::Stage : public Reporter {
     inStage(name(), [&] { options_.parse(arguments, common); });
   }
 
-  void plan(const Schema* in) {
+  void plan(const Schema& in) {
     inStage(name(), [&] {
       if (source()) {
         out_ = source()->plan();
       } else if (filter()) {
-        out_ = filter()->plan(*in);
+        out_ = filter()->plan(in);
         reads_ = filter()->reads();
       } else {
-        out_ = *in;
-        sink()->plan(*in);
+        out_ = in;
+        sink()->plan(in);
       }
     });
     if (info_.transport || sink()) return;
@@ -240,11 +240,12 @@ void Pipeline::addStage(const Step& step) {
 
 void Pipeline::plan(Watcher& watcher) {
   watcher_ = &watcher;
-  const Schema* schema = nullptr;
+  const Schema nothing;
+  const Schema* in = &nothing;
   for (const auto& stage : stages_) {
     stage->watcher = &watcher;
-    stage->plan(schema);
-    schema = &stage->out();
+    stage->plan(*in);
+    in = &stage->out();
   }
   if (options_.stream) {
     for (const auto& stage : stages_) {
@@ -254,7 +255,7 @@ void Pipeline::plan(Watcher& watcher) {
       }
     }
   }
-  wanted_ = parseLayers(options_.layers, schema->lattice.layers());
+  wanted_ = parseLayers(options_.layers, in->lattice.layers());
   planRanges();
   planSlabs();
 }

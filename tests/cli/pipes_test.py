@@ -65,6 +65,13 @@ class Damage(ProgramTest):
             spoilt[self.random.randrange(len(spoilt))] ^= 1 << self.random.randrange(8)
             self.refuse_frames(bytes(spoilt))
 
+    def test_layers_that_never_come_are_an_error(self):
+        for layers, first in (("16:32", 0), ("0:16", 16)):
+            some = self.succeed("mesh2sdf", "part.stl", *MIMAKI, "--layers", layers)
+            done = self.refuse(1, "standard input lacks layer", "normals", "-o", "out.vdb", input=some)
+            self.assertIn(f"lacks layer {first};", done.stderr.decode())
+        self.succeed("normals", "--layers", "4:12", "-o", "out.vdb", input=some)
+
     def test_what_is_no_vdb_is_refused(self):
         for text in (b"hello\n", bytes(5000), self.random.randbytes(5000)):
             self.refuse_frames(text)
