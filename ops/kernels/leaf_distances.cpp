@@ -41,8 +41,9 @@ template <class Set, int rank, int fixed_count, bool track>
   const int i_end = std::min(feature.reach.max().x() - origin.x() + 1, edge);
   const int j_begin = std::max(feature.reach.min().y() - origin.y(), 0);
   const int j_end = std::min(feature.reach.max().y() - origin.y() + 1, edge);
-  const int k_begin = std::max(feature.reach.min().z() - origin.z(), 0);
-  const int k_end = std::min(feature.reach.max().z() - origin.z() + 1, edge);
+  // Whole vectors of the widest set, so that every set visits the same voxels.
+  const int k_begin = std::max(feature.reach.min().z() - origin.z(), 0) & ~3;
+  const int k_end = (std::min(feature.reach.max().z() - origin.z() + 1, edge) + 3) & ~3;
 
   double x[capacity], y[capacity], constant[capacity];
   double inverse_y[capacity], most[capacity], least[capacity];  // of a bound along its column
