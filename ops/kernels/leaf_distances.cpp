@@ -147,7 +147,7 @@ template <class Set>
       const auto within = Flags{} + static_cast<std::int64_t>(inside[plane] >> v);
       const Flags on = (root < limit_mm) & ((existing & bit) != 0);
       const Lanes magnitude = on ? root : background;
-      const Lanes value = (within & bit) != 0 ? -magnitude : magnitude;
+      const Lanes value = (within & bit) != 0 ? Lanes{} - magnitude : magnitude;
       const Flags marks = on & bit;
       std::int64_t mark = 0;
       for (int lane = 0; lane < width; ++lane) {

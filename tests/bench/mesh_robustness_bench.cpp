@@ -54,8 +54,9 @@ void judge(const std::filesystem::path& path, int samples) {
 
   std::mt19937 random(1);
   const auto wrongAt = [&](const Coord& ijk, const Mesh& mesh) {
-    return (std::abs(windingNumber(mesh, lattice.position(ijk))) > 0.5) !=
-           (surface.getValue(ijk) < 0);
+    const float distance = surface.getValue(ijk);
+    if (std::abs(distance) < 1e-6F) return false;  // on the surface
+    return (std::abs(windingNumber(mesh, lattice.position(ijk))) > 0.5) != (distance < 0);
   };
   std::vector<Coord> band;
   for (auto it = grids.surface->cbeginValueOn(); it; ++it)
