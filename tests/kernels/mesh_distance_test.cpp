@@ -11,6 +11,7 @@
 #include <tbb/global_control.h>
 
 #include "tests/support/shapes.h"
+#include "vdbdither/layers.h"
 
 namespace vdbdither {
 namespace {
@@ -255,15 +256,21 @@ void expectSame(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
 TEST(MeshDistance, SlabsOfAnyHeightGiveTheWhole) {
   const Mesh mesh = transformed(torusMesh({0, 0, 0}, 0.8, 0.3, 30), {20, 30, 0}, {0.3, 0, 0});
   const Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);
-  const MeshDistance field(std::make_shared<Mesh>(mesh), lattice, Band{0, 0.12});
-  const DistanceGrids whole = field.run(lattice.layers());
-  for (const int height : {8, 16, 40}) {
-    const auto pieces = openvdb::FloatGrid::create(0.12F);
-    const ZRange all = alignedToLeaves(lattice.layers());
-    for (int begin = all.begin; begin < all.end; begin += height)
-      pieces->tree().merge(field.run({begin, begin + height}).surface->tree());
-    openvdb::tools::prune(pieces->tree());
-    expectSame(*whole.surface, *pieces);
+  for (const Band band : {Band{}, Band{0, 0.12}}) {
+    const MeshDistance field(std::make_shared<Mesh>(mesh), lattice, band);
+    const DistanceGrids whole = field.run(lattice.layers());
+    for (const int height : {8, 16, 40}) {
+      std::vector<Layers> pieces;
+      const ZRange all = alignedToLeaves(lattice.layers());
+      for (int begin = all.begin; begin < all.end; begin += height) {
+        const ZRange range{begin, begin + height};
+        pieces.push_back({field.run(range).surface, range});
+      }
+      const auto joined =
+          openvdb::gridConstPtrCast<openvdb::FloatGrid>(joinLayers(pieces, all))->deepCopy();
+      openvdb::tools::prune(joined->tree());
+      expectSame(*whole.surface, *joined);
+    }
   }
 }
 
