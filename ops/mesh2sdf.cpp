@@ -6,6 +6,7 @@
 #include "io/mesh_reader.h"
 #include "io/printer_profile.h"
 #include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/mesh_repair.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
@@ -84,6 +85,7 @@ class MeshToSdf : public Source {
         "band", band_text_, "N|MM",
         "How far from the surface distances are kept: in voxel diameters along the normal, or "
         "with a unit as a length");
+    options.flag("strict", strict_, "Refuses a mesh that needs repair");
     options.flag("normals", extras_.normals, "Adds the grid 'N', exact unit outward normals");
     options.flag("closest", extras_.closest,
                  "Adds the grid 'closest', the index of the nearest triangle");
@@ -95,6 +97,7 @@ class MeshToSdf : public Source {
     band_ = bandFrom(band_text_);
     auto mesh = std::make_shared<Mesh>(readMeshes());
     placeMesh(*mesh);
+    repair(*mesh);
     schema.lattice = latticeAround(*mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
     schema.leaves_per_row = leavesPerRow(*mesh, lattice);
@@ -135,6 +138,25 @@ class MeshToSdf : public Source {
     const double size = parseLengthMm(text);
     if (!(size > 0)) throw UsageError("--band: '" + text + "' is not above zero");
     return diameters ? Band{size, 0} : Band{0, size};
+  }
+
+  void repair(Mesh& mesh) const {
+    MeshRepairs repairs;
+    mesh = repaired(std::move(mesh), repairs);
+    if (mesh.triangles.empty())
+      throw DataError("the mesh has no surface: all its triangles are degenerate or cancel");
+    const std::vector<std::string> lines = repairs.lines();
+    if (strict_ && !lines.empty())
+      throw DataError("the mesh needs repair, which --strict forbids: " + lines.front() +
+                      (lines.size() > 1 ? " and more" : ""));
+    for (const std::string& line : lines) report().warn(line);
+    report().count("welded_vertices", static_cast<double>(repairs.welded_vertices));
+    report().count("degenerate_triangles", static_cast<double>(repairs.degenerate_triangles));
+    report().count("duplicate_triangles", static_cast<double>(repairs.duplicate_triangles));
+    report().count("flipped_triangles", static_cast<double>(repairs.flipped_triangles));
+    report().count("turned_parts", static_cast<double>(repairs.turned_parts));
+    report().count("boundary_edges", static_cast<double>(repairs.boundary_edges));
+    report().count("closed_holes", static_cast<double>(repairs.closed_holes));
   }
 
   Mesh readMeshes() const {
@@ -233,6 +255,7 @@ class MeshToSdf : public Source {
   double fit_mm_ = 0;
   Vec3d rotate_{0, 0, 0};
   bool place_ = false;
+  bool strict_ = false;
   int refine_y_ = 1;
   std::string band_text_ = "1";
   DistanceExtras extras_;

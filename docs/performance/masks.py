@@ -23,4 +23,4 @@ for axis in (by_size, by_support):
     axis.grid(alpha=0.3)
     axis.legend()
 figure.tight_layout()
-figure.savefig(sys.argv[1], metadata={"Software": None})
+figure.savefig(sys.argv[1])

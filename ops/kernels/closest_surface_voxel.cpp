@@ -188,8 +188,10 @@ std::optional<ClosestSurfaceVoxel::Found> ClosestSurfaceVoxel::operator()(unsign
   int best_k = 0;
   for (const SearchDisk::Column& column : disk_.columns_) {
     if (column.lateral2 > best2) break;
-    const int below = stepsDown(centre + column.offset, z);
-    const int above = stepsUp(centre + column.offset, disk_.words_, z);
+    const std::uint64_t* words = centre + column.offset;
+    if (disk_.words_ == 1 && *words == 0) continue;
+    const int below = stepsDown(words, z);
+    const int above = stepsUp(words, disk_.words_, z);
     const int steps = std::min(below, above);
     if (steps > halo.z()) continue;
     const double distance2 = column.lateral2 + disk_.height2_[static_cast<std::size_t>(steps)];

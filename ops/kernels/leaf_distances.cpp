@@ -41,8 +41,9 @@ template <class Set, int rank, int fixed_count, bool track>
   const int i_end = std::min(feature.reach.max().x() - origin.x() + 1, edge);
   const int j_begin = std::max(feature.reach.min().y() - origin.y(), 0);
   const int j_end = std::min(feature.reach.max().y() - origin.y() + 1, edge);
-  const int k_begin = std::max(feature.reach.min().z() - origin.z(), 0);
-  const int k_end = std::min(feature.reach.max().z() - origin.z() + 1, edge);
+  // Whole vectors of the widest set, so that every set visits the same voxels.
+  const int k_begin = std::max(feature.reach.min().z() - origin.z(), 0) & ~3;
+  const int k_end = (std::min(feature.reach.max().z() - origin.z() + 1, edge) + 3) & ~3;
 
   double x[capacity], y[capacity], constant[capacity];
   double inverse_y[capacity], most[capacity], least[capacity];  // of a bound along its column
@@ -146,7 +147,7 @@ template <class Set>
       const auto within = Flags{} + static_cast<std::int64_t>(inside[plane] >> v);
       const Flags on = (root < limit_mm) & ((existing & bit) != 0);
       const Lanes magnitude = on ? root : background;
-      const Lanes value = (within & bit) != 0 ? -magnitude : magnitude;
+      const Lanes value = (within & bit) != 0 ? Lanes{} - magnitude : magnitude;
       const Flags marks = on & bit;
       std::int64_t mark = 0;
       for (int lane = 0; lane < width; ++lane) {

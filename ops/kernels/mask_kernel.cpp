@@ -15,7 +15,10 @@ constexpr double pi = 3.14159265358979323846;
 double decay(double x) {
   if (x > 700) return 0;
   int halvings = 0;
-  for (; x > 0.125; x /= 2) ++halvings;
+  while (x > 0.125) {
+    x /= 2;
+    ++halvings;
+  }
   double sum = 1;
   for (int i = 14; i > 0; --i) sum = 1 - sum * x / i;
   for (; halvings > 0; --halvings) sum *= sum;

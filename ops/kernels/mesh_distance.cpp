@@ -182,10 +182,6 @@ template <class Visit>
 void visitLeaves(std::span<const LinearForm> limits, const CoordBBox& reach, const Visit& visit) {
   const Coord first = reach.min() >> 3;
   const Coord last = reach.max() >> 3;
-  if (first == last) {
-    visit(first);
-    return;
-  }
   const auto best = [](double slope, int leaf) {
     return std::max(slope * (leaf * edge), slope * (leaf * edge + edge - 1));
   };

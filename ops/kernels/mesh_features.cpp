@@ -85,11 +85,10 @@ Vec3d arcReach(const Vec3d& a, const Vec3d& b) {
 }  // namespace
 
 MeshFeatures::MeshFeatures(const Mesh& mesh, const Vec3d& origin_mm, double layer_mm)
-    : mesh_(mesh) {
+    : mesh_(mesh), edges_(mesh) {
   positions_.reserve(mesh.vertices.size());
   for (const Vec3d& vertex : mesh.vertices) positions_.push_back(vertex - origin_mm);
   findNormals();
-  findEdges();
   findNeighbours();
   sortByLayer(layer_mm);
 }
@@ -98,8 +97,8 @@ double MeshFeatures::memoryBytes() const {
   const auto bytes = [](const auto& vector) {
     return static_cast<double>(vector.capacity() * sizeof(vector[0]));
   };
-  return bytes(positions_) + bytes(normals_) + bytes(edges_) + bytes(half_edges_) +
-         bytes(first_edge_) + bytes(vertex_edges_) + bytes(order_) + bytes(blocks_);
+  return bytes(positions_) + bytes(normals_) + edges_.memoryBytes() + bytes(first_edge_) +
+         bytes(vertex_edges_) + bytes(order_) + bytes(blocks_);
 }
 
 void MeshFeatures::findNormals() {
@@ -110,47 +109,9 @@ void MeshFeatures::findNormals() {
   });
 }
 
-void MeshFeatures::findEdges() {
-  struct HalfEdge {
-    std::uint32_t to, half;
-  };
-  const auto ends = [this](std::size_t half) {
-    const Mesh::Triangle& t = mesh_.triangles[half / 3];
-    return std::minmax({t[half % 3], t[(half + 1) % 3]});
-  };
-  const std::size_t halves = 3 * mesh_.triangles.size();
-  std::vector<std::uint32_t> first(positions_.size() + 1, 0);
-  for (std::size_t half = 0; half < halves; ++half) {
-    const auto [from, to] = ends(half);
-    if (from != to) ++first[from + 1];
-  }
-  for (std::size_t v = 0; v < positions_.size(); ++v) first[v + 1] += first[v];
-  std::vector<HalfEdge> sorted(first.back());
-  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
-  for (std::size_t half = 0; half < halves; ++half) {
-    const auto [from, to] = ends(half);
-    if (from != to) sorted[next[from]++] = {to, static_cast<std::uint32_t>(half)};
-  }
-  half_edges_.reserve(sorted.size());
-  edges_.reserve(sorted.size() / 2 + 1);
-  for (std::uint32_t from = 0; from < positions_.size(); ++from) {
-    const auto begin = sorted.begin() + first[from];
-    const auto end = sorted.begin() + first[from + 1];
-    std::sort(begin, end, [](const HalfEdge& a, const HalfEdge& b) {
-      return std::pair(a.to, a.half) < std::pair(b.to, b.half);
-    });
-    for (auto it = begin; it != end; ++it) {
-      if (it == begin || it->to != std::prev(it)->to)
-        edges_.push_back({from, it->to, static_cast<std::uint32_t>(half_edges_.size())});
-      half_edges_.push_back(it->half);
-    }
-  }
-  edges_.push_back({0, 0, static_cast<std::uint32_t>(half_edges_.size())});
-}
-
 void MeshFeatures::findNeighbours() {
   first_edge_.assign(positions_.size() + 1, 0);
-  const auto count = static_cast<std::uint32_t>(edges_.size() - 1);
+  const std::uint32_t count = edges_.size();
   for (std::uint32_t e = 0; e < count; ++e) {
     ++first_edge_[edges_[e].from + 1];
     ++first_edge_[edges_[e].to + 1];
@@ -187,7 +148,7 @@ void MeshFeatures::sortByLayer(double layer_mm) {
   std::vector<Id> all;
   all.reserve(mesh_.triangles.size() + edges_.size() + positions_.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) all.emplace_back(Kind::face, t);
-  for (std::uint32_t e = 0; e + 1 < edges_.size(); ++e) all.emplace_back(Kind::edge, e);
+  for (std::uint32_t e = 0; e < edges_.size(); ++e) all.emplace_back(Kind::edge, e);
   for (std::uint32_t v = 0; v < positions_.size(); ++v)
     if (first_edge_[v] < first_edge_[v + 1]) all.emplace_back(Kind::vertex, v);
   if (all.empty()) return;
@@ -264,7 +225,7 @@ MeshFeature MeshFeatures::describeFace(std::uint32_t triangle) const {
 }
 
 MeshFeature MeshFeatures::describeEdge(std::uint32_t index) const {
-  const Edge& edge = edges_[index];
+  const MeshEdges::Edge& edge = edges_[index];
   const Vec3d& a = positions_[edge.from];
   const Vec3d& b = positions_[edge.to];
   MeshFeature feature;
@@ -282,11 +243,11 @@ MeshFeature MeshFeatures::describeEdge(std::uint32_t index) const {
   std::array<Vec3d, 2> normals;
   std::array<Vec3d, 2> outwards;
   std::uint32_t faces = 0;
-  for (std::uint32_t i = edge.first; i < edges_[index + 1].first; ++i) {
-    const std::uint32_t triangle = half_edges_[i] / 3;
+  for (const std::uint32_t half : edges_.halves(index)) {
+    const std::uint32_t triangle = half / 3;
     const Vec3d& n = normals_[triangle];
     if (n == Vec3d(0, 0, 0)) continue;
-    const bool forward = mesh_.triangles[triangle][half_edges_[i] % 3] == edge.from;
+    const bool forward = mesh_.triangles[triangle][half % 3] == edge.from;
     const Vec3d outward = forward ? along.cross(n) : n.cross(along);
     if (faces < 2) {
       normals[faces] = n;
@@ -321,7 +282,7 @@ MeshFeature MeshFeatures::describeVertex(std::uint32_t index) const {
   }
   for (std::uint32_t i = first_edge_[index]; i < first_edge_[index + 1]; ++i) {
     if (feature.bounds == MeshFeature::max_bounds) break;
-    const Edge& edge = edges_[vertex_edges_[i]];
+    const MeshEdges::Edge& edge = edges_[vertex_edges_[i]];
     const Vec3d& other = positions_[edge.from == index ? edge.to : edge.from];
     feature.forms[static_cast<std::size_t>(3 + feature.bounds++)] = halfSpace(p - other, p);
   }
@@ -331,9 +292,8 @@ MeshFeature MeshFeatures::describeVertex(std::uint32_t index) const {
 std::vector<Vec3d> MeshFeatures::leastNormals() const {
   std::vector<Vec3d> least(normals_.size());
   std::transform(normals_.begin(), normals_.end(), least.begin(), magnitudes);
-  for (std::size_t e = 0; e + 1 < edges_.size(); ++e) {
-    const std::span halves(half_edges_.data() + edges_[e].first,
-                           edges_[e + 1].first - edges_[e].first);
+  for (std::uint32_t e = 0; e < edges_.size(); ++e) {
+    const auto halves = edges_.halves(e);
     Vec3d across(0, 0, 0);  // unknown at borders and where more than two faces meet
     if (halves.size() == 2) {
       const auto start = [&](std::size_t i) {
@@ -351,10 +311,10 @@ std::vector<Vec3d> MeshFeatures::leastNormals() const {
 
 std::uint32_t MeshFeatures::triangleOf(Id id) const {
   if (id.kind() == Kind::face) return id.index();
-  if (id.kind() == Kind::edge) return half_edges_[edges_[id.index()].first] / 3;
+  if (id.kind() == Kind::edge) return edges_.halves(id.index()).front() / 3;
   std::uint32_t lowest = std::numeric_limits<std::uint32_t>::max();
   for (std::uint32_t i = first_edge_[id.index()]; i < first_edge_[id.index() + 1]; ++i)
-    lowest = std::min(lowest, half_edges_[edges_[vertex_edges_[i]].first] / 3);
+    lowest = std::min(lowest, edges_.halves(vertex_edges_[i]).front() / 3);
   return lowest;
 }
 

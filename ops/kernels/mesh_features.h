@@ -6,6 +6,7 @@
 
 #include <openvdb/math/Vec3.h>
 
+#include "ops/kernels/mesh_edges.h"
 #include "vdbdither/mesh.h"
 
 namespace vdbdither {
@@ -92,17 +93,11 @@ class MeshFeatures {
   [[nodiscard]] std::uint32_t triangleOf(Id id) const;
 
  private:
-  struct Edge {
-    std::uint32_t from = 0, to = 0;  ///< from < to
-    std::uint32_t first =
-        0;  ///< its half-edges in `half_edges_` end where those of the next edge begin
-  };
   struct Extent {
     double low, high;
   };
 
   void findNormals();
-  void findEdges();
   void findNeighbours();
   void sortByLayer(double layer_mm);
 
@@ -114,10 +109,8 @@ class MeshFeatures {
   const Mesh& mesh_;
   std::vector<openvdb::Vec3d> positions_;
   std::vector<openvdb::Vec3d> normals_;
-  std::vector<Edge> edges_;                ///< one more than there are, to end the last
-  std::vector<std::uint32_t> half_edges_;  ///< 3 · triangle + corner that it starts at, by edge
-  std::vector<std::uint32_t>
-      first_edge_;  ///< by vertex, into `vertex_edges_`; one more than there are
+  MeshEdges edges_;
+  std::vector<std::uint32_t> first_edge_;  ///< by vertex, and the end of the last
   std::vector<std::uint32_t> vertex_edges_;
   std::vector<Id> order_;
   std::vector<Extent> blocks_;  ///< of every `block_size` features in order

@@ -1,5 +1,6 @@
 #include "ops/kernels/threshold_mask.h"
 
+#include <bit>
 #include <cassert>
 #include <string>
 #include <utility>
@@ -28,6 +29,7 @@ std::string text(const Coord& ijk) {
 }
 
 int positiveModulo(int value, int modulus) {
+  if (std::has_single_bit(static_cast<unsigned>(modulus))) return value & (modulus - 1);
   const int rest = value % modulus;
   return rest < 0 ? rest + modulus : rest;
 }

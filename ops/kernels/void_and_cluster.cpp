@@ -504,7 +504,7 @@ std::uint32_t initialCount(std::uint32_t count) {
 }
 
 double smallestWeight(const openvdb::Coord& size) {
-  return isSmall(size) ? 0 : std::ldexp(1.0, -14);
+  return isSmall(size) ? 0 : std::ldexp(1.0, -12);
 }
 
 std::vector<std::uint32_t> voidAndCluster(const VoidAndCluster& settings,

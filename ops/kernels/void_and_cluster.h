@@ -31,7 +31,7 @@ std::vector<std::uint32_t> randomPermutation(std::uint32_t count, std::uint64_t 
 std::uint32_t initialCount(std::uint32_t count);
 
 /// The smallest weight, relative to the kernel's peak, that takes part in the energies of a tile.
-/// Zero up to 32768 voxels: all that the integers resolve, 2^-40. Above, 2^-14: a rank costs what
+/// Zero up to 32768 voxels: all that the integers resolve, 2^-40. Above, 2^-12: a rank costs what
 /// it touches.
 double smallestWeight(const openvdb::Coord& size);
 

@@ -11,6 +11,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import pyopenvdb
+from PIL import Image
 
 work, result = map(pathlib.Path, sys.argv[1:3])
 plt.rcParams.update({"font.size": 8, "figure.dpi": 90, "axes.grid": True, "grid.alpha": 0.3})
@@ -34,8 +35,10 @@ def tile(kernel, sigma):
 
 def save(figure, name):
     figure.tight_layout()
-    figure.savefig(result / name, metadata={"Software": None})
+    figure.savefig(result / name)
     plt.close(figure)
+    with Image.open(result / name) as image:
+        image.convert("RGB").quantize(64).save(result / name, optimize=True)
 
 
 def low(bands, spectrum):
@@ -88,28 +91,29 @@ def figure_2():
 def figure_4(masks):
     figure, axes = plt.subplots(2, 3, figsize=(10, 6))
     shown = [s for s in (0.5, 0.8, 1.1, 1.5, 1.9, 2.5, 3.1) if s in masks]
-    panels = ((axes[0, 0], "a  grey, mean over normals", lambda s: s["grey"]["projection"]["mean"]),
-              (axes[0, 1], "b  grey, greatest over normals", lambda s: s["grey"]["projection"]["greatest"]),
-              (axes[0, 2], "c  thresholded, mean over normals and κ", lambda s: thresholded(s, "mean", np.mean)),
-              (axes[1, 0], "d  thresholded, greatest over normals and κ", lambda s: thresholded(s, "greatest", np.max)))
+    panels = ((axes[0, 0], "a  grey, mean", lambda s: s["grey"]["projection"]["mean"]),
+              (axes[0, 1], "b  grey, greatest", lambda s: s["grey"]["projection"]["greatest"]),
+              (axes[0, 2], "c  thresholded, mean", lambda s: thresholded(s, "mean", np.mean)),
+              (axes[1, 0], "d  thresholded, greatest", lambda s: thresholded(s, "greatest", np.max)))
     for axis, title, curve in panels:
         for sigma in shown:
             spectrum = masks[sigma][0]
             frequency = (np.arange(spectrum["bands"]) + 0.5) / (2 * spectrum["bands"])
             axis.plot(frequency, curve(spectrum), label=f"σ = {sigma}", linewidth=1)
-        axis.set(title=title, xlabel="cycles per voxel", ylabel="power, white noise = 1", ylim=(0, None))
-    axes[0, 0].legend()
+        top = 2 if "mean" in title else 4  # the greatest of σ = 0.5 goes far beyond
+        axis.set(title=title, xlabel="cycles per voxel", ylabel="power, white noise = 1", ylim=(0, top))
+    axes[0, 0].legend(ncol=2)
     table = {sigma: mean_and_spread([figures_of(s) for s in seeds]) for sigma, seeds in masks.items()}
     sigmas = sorted(table)
     for key in ("grey_mean", "grey_greatest", "thresholded_mean", "thresholded_greatest"):
         axes[1, 1].errorbar(sigmas, [table[s][key]["mean"] for s in sigmas],
                             [table[s][key]["spread"] / 2 for s in sigmas], label=key.replace("_", ", "), linewidth=1)
-    axes[1, 1].set(title="e  power below 1/8 cycle per voxel", xlabel="σ", ylim=(0, None))
+    axes[1, 1].set(title="e  power below 1/8 cycle per voxel", xlabel="σ", ylim=(0, 3))
     axes[1, 1].legend()
     kappa = [level["kappa"] for level in masks[sigmas[0]][0]["thresholded"]]
     for sigma in shown:
         axes[1, 2].plot(kappa, table[sigma]["by_threshold"]["mean"], label=f"σ = {sigma}", linewidth=1)
-    axes[1, 2].set(title="f  the same by threshold κ, mean over normals", xlabel="κ", ylim=(0, None))
+    axes[1, 2].set(title="f  the same by threshold, mean", xlabel="κ", ylim=(0, None))
     save(figure, "figure-4.png")
 
 

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/painted.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 

@@ -6,14 +6,14 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 
 namespace vdbdither {
 namespace {
 
-using test::TemporaryFolder;
+using test::ScratchFolder;
 
 VdbContents sample() {
   const auto surface = openvdb::FloatGrid::create(0.2F);
@@ -59,7 +59,7 @@ class Vdb : public testing::Test {
  protected:
   void SetUp() override { initializeVdb(); }
 
-  TemporaryFolder folder_;
+  ScratchFolder folder_;
 };
 
 TEST_F(Vdb, WhatWasWrittenReadsBack) {

@@ -11,6 +11,7 @@
 #include <tbb/global_control.h>
 
 #include "tests/support/shapes.h"
+#include "vdbdither/layers.h"
 
 namespace vdbdither {
 namespace {
@@ -255,15 +256,21 @@ void expectSame(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
 TEST(MeshDistance, SlabsOfAnyHeightGiveTheWhole) {
   const Mesh mesh = transformed(torusMesh({0, 0, 0}, 0.8, 0.3, 30), {20, 30, 0}, {0.3, 0, 0});
   const Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);
-  const MeshDistance field(std::make_shared<Mesh>(mesh), lattice, Band{0, 0.12});
-  const DistanceGrids whole = field.run(lattice.layers());
-  for (const int height : {8, 16, 40}) {
-    const auto pieces = openvdb::FloatGrid::create(0.12F);
-    const ZRange all = alignedToLeaves(lattice.layers());
-    for (int begin = all.begin; begin < all.end; begin += height)
-      pieces->tree().merge(field.run({begin, begin + height}).surface->tree());
-    openvdb::tools::prune(pieces->tree());
-    expectSame(*whole.surface, *pieces);
+  for (const Band band : {Band{}, Band{0, 0.12}}) {
+    const MeshDistance field(std::make_shared<Mesh>(mesh), lattice, band);
+    const DistanceGrids whole = field.run(lattice.layers());
+    for (const int height : {8, 16, 40}) {
+      std::vector<Layers> pieces;
+      const ZRange all = alignedToLeaves(lattice.layers());
+      for (int begin = all.begin; begin < all.end; begin += height) {
+        const ZRange range{begin, begin + height};
+        pieces.push_back({field.run(range).surface, range});
+      }
+      const auto joined =
+          openvdb::gridConstPtrCast<openvdb::FloatGrid>(joinLayers(pieces, all))->deepCopy();
+      openvdb::tools::prune(joined->tree());
+      expectSame(*whole.surface, *joined);
+    }
   }
 }
 
@@ -278,6 +285,69 @@ TEST(MeshDistance, ThreadsDoNotChangeABit) {
     ASSERT_EQ(*it, few.normals->tree().getValue(it.getCoord()));
   for (auto it = many.closest->cbeginValueOn(); it; ++it)
     ASSERT_EQ(*it, few.closest->tree().getValue(it.getCoord()));
+}
+
+/// Half the voxel's diameter along n, times two: what dithering with the constant 4 moves a surface
+/// by at most.
+double diameterAlong(const Vec3d& n, const Vec3d& pitch_mm) {
+  const Vec3d scaled = n / pitch_mm;
+  return 1 / std::max({std::abs(scaled.x()), std::abs(scaled.y()), std::abs(scaled.z())});
+}
+
+/// Checks that the default band holds every surface voxel, one neighbour outside for each of its
+/// open sides, and every voxel that dithering may decide by what it reads at the closest surface
+/// voxel.
+void expectBandForDithering(const Mesh& mesh, const Vec3d& pitch_mm) {
+  const Lattice lattice = latticeAround(mesh, pitch_mm, {0, 0, 0}, 8);
+  const auto shared = std::make_shared<Mesh>(mesh);
+  const DistanceGrids wide =
+      MeshDistance(shared, lattice, Band{0, 2.5 * pitch_mm.length()}, {true, false})
+          .run(lattice.layers());
+  const DistanceGrids band = MeshDistance(shared, lattice, Band{}).run(lattice.layers());
+  EXPECT_LT(band.surface->activeVoxelCount(), wide.surface->activeVoxelCount() / 2);
+  const openvdb::FloatTree& exact = wide.surface->tree();
+  const openvdb::FloatTree& kept = band.surface->tree();
+  for (auto it = band.surface->cbeginValueOn(); it; ++it)
+    ASSERT_EQ(*it, exact.getValue(it.getCoord()));
+
+  std::vector<Coord> surface_voxels;
+  for (auto it = wide.surface->cbeginValueOn(); it; ++it) {
+    if (!(*it < 0)) continue;
+    bool open = false;
+    for (const Coord& step : {Coord(1, 0, 0), Coord(0, 1, 0), Coord(0, 0, 1)}) {
+      for (const Coord& neighbour : {it.getCoord() + step, it.getCoord() - step}) {
+        if (exact.getValue(neighbour) < 0) continue;
+        open = true;
+        ASSERT_TRUE(kept.isValueOn(neighbour)) << neighbour;
+      }
+    }
+    if (!open) continue;
+    ASSERT_TRUE(kept.isValueOn(it.getCoord())) << it.getCoord();
+    surface_voxels.push_back(it.getCoord());
+  }
+  for (auto it = wide.surface->cbeginValueOn(); it; ++it) {
+    const double distance = std::abs(*it);
+    if (distance >= pitch_mm.length() || kept.isValueOn(it.getCoord())) continue;
+    const Vec3d p = lattice.position(it.getCoord());
+    const Coord closest = *std::min_element(
+        surface_voxels.begin(), surface_voxels.end(), [&](const Coord& a, const Coord& b) {
+          return (lattice.position(a) - p).lengthSqr() < (lattice.position(b) - p).lengthSqr();
+        });
+    ASSERT_GE(distance,
+              diameterAlong(Vec3d(wide.normals->tree().getValue(closest)), pitch_mm) - 1e-6)
+        << it.getCoord() << " is decided at " << closest;
+  }
+}
+
+TEST(MeshDistance, TheDefaultBandHoldsWhatDitheringReads) {
+  for (const Vec3d& pitch : {mimaki, stratasys, cube}) {
+    expectBandForDithering(sphereMesh({0.1, 0.2, 0.3}, 0.45, 12), pitch);
+    expectBandForDithering(boxMesh({-0.31, -0.42, -0.2}, {0.33, 0.4, 0.21}), pitch);
+    expectBandForDithering(
+        transformed(boxMesh({-0.4, -0.3, -0.2}, {0.4, 0.3, 0.2}), {2, 31, 12}, {0.1, 0.2, 0.3}),
+        pitch);
+    expectBandForDithering(torusMesh({0, 0, 0.4}, 0.4, 0.2, 18), pitch);
+  }
 }
 
 TEST(MeshDistance, NormalsPointFromTheNearestPointOutwards) {

@@ -230,6 +230,52 @@ TEST(VoidAndCluster, EqualEnergiesGoByTheRandomPermutation) {
   }
 }
 
+TEST(VoidAndCluster, LargeTilesTakeTheLargestVoidAndTheTightestClusterAtEveryRank) {
+  for (const Coord size : {Coord(40, 32, 30), Coord(35, 33, 31)}) {
+    const VoidAndCluster mask = settings(size, Shape::peters, 1.1);
+    const std::vector<std::uint32_t> ranks = voidAndCluster(mask);
+    ASSERT_TRUE(isPermutation(ranks));
+    const ToroidalKernel kernel(mask.kernel, size);
+    std::vector<std::pair<Coord, double>> weights;
+    for (int z = 0; z < size.z(); ++z) {
+      for (int y = 0; y < size.y(); ++y) {
+        for (int x = 0; x < size.x(); ++x) {
+          const double weight = kernel(x, y, z);
+          if (std::abs(weight) >= smallestWeight(size)) weights.push_back({{x, y, z}, weight});
+        }
+      }
+    }
+    const auto index = [&](int x, int y, int z) {
+      return x % size.x() + size.x() * (y % size.y() + size.y() * (z % size.z()));
+    };
+    const std::uint32_t initial = initialCount(ranks.size());
+    for (const std::uint32_t rank : {10u, initial - 1, initial, 9000u, 20000u, 30000u}) {
+      // The pattern in which the voxel of this rank is set last or taken out first.
+      const bool removed = rank < initial;
+      std::vector<double> energy(ranks.size());
+      for (int z = 0; z < size.z(); ++z) {
+        for (int y = 0; y < size.y(); ++y) {
+          for (int x = 0; x < size.x(); ++x) {
+            if (ranks[index(x, y, z)] >= rank + removed) continue;
+            for (const auto& [d, weight] : weights) {
+              energy[index(x + d.x(), y + d.y(), z + d.z())] += weight;
+            }
+          }
+        }
+      }
+      double chosen = 0;
+      double least = 1e9;
+      double greatest = -1e9;
+      for (std::size_t i = 0; i < ranks.size(); ++i) {
+        if (ranks[i] == rank) chosen = energy[i];
+        if (ranks[i] >= rank) least = std::min(least, energy[i]);
+        if (ranks[i] <= rank) greatest = std::max(greatest, energy[i]);
+      }
+      EXPECT_NEAR(chosen, removed ? greatest : least, 1e-4) << rank;
+    }
+  }
+}
+
 TEST(VoidAndCluster, RanksArePermutation) {
   for (const Shape shape : {Shape::peters, Shape::gauss, Shape::axis_mix}) {
     EXPECT_TRUE(isPermutation(voidAndCluster(settings({20, 40, 36}, shape, 1.1))));

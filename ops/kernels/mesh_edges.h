@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "vdbdither/mesh.h"
+
+namespace vdbdither {
+
+/// The edges of a mesh and the sides of triangles that lie on them. Half-edge h is the side of
+/// triangle h / 3 that starts at its corner h % 3. Sides from a vertex to itself are left out.
+class MeshEdges {
+ public:
+  struct Edge {
+    std::uint32_t from = 0, to = 0;  ///< from < to
+    std::uint32_t first = 0;         ///< where its half-edges begin
+  };
+
+  explicit MeshEdges(const Mesh& mesh);
+
+  [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(edges_.size() - 1); }
+  [[nodiscard]] const Edge& operator[](std::uint32_t edge) const { return edges_[edge]; }
+  /// In rising order.
+  [[nodiscard]] std::span<const std::uint32_t> halves(std::uint32_t edge) const {
+    return {halves_.data() + edges_[edge].first, edges_[edge + 1].first - edges_[edge].first};
+  }
+  [[nodiscard]] double memoryBytes() const {
+    return static_cast<double>(edges_.capacity() * sizeof(Edge) +
+                               halves_.capacity() * sizeof(std::uint32_t));
+  }
+
+ private:
+  std::vector<Edge> edges_;  ///< one more than there are, to end the last; sorted by from, to
+  std::vector<std::uint32_t> halves_;
+};
+
+}  // namespace vdbdither

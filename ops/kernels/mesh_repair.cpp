@@ -1,0 +1,340 @@
+// Whatever the triangles are, the sides that nothing meets from the other side form closed loops.
+// Filling these makes the mesh a cycle, for which the winding number is whole. For a flat hole the
+// fan is where the generalized winding number of the open mesh (Jacobson, Kavan, Sorkine-Hornung,
+// "Robust inside-outside segmentation using generalized winding numbers", 2013) is one half.
+
+#include "ops/kernels/mesh_repair.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "ops/kernels/mesh_edges.h"
+
+namespace vdbdither {
+
+using openvdb::Vec3d;
+
+namespace {
+
+/// Far below a voxel, far above the rounding of coordinates that were written as floats.
+constexpr double weld_mm = 1e-3;
+
+using Triangle = Mesh::Triangle;
+
+/// Renumbers the corners and drops the triangles that lost one.
+void renumber(Mesh& mesh, const std::vector<std::uint32_t>& to, MeshRepairs& repairs) {
+  for (Triangle& t : mesh.triangles)
+    for (std::uint32_t& v : t) v = to[v];
+  repairs.degenerate_triangles += std::erase_if(mesh.triangles, [](const Triangle& t) {
+    return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+  });
+}
+
+void weldEqual(Mesh& mesh, MeshRepairs& repairs) {
+  std::vector<std::uint32_t> order(mesh.vertices.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto key = [&](std::uint32_t v) {
+    const Vec3d p = mesh.vertices[v] + Vec3d(0, 0, 0);  // −0 becomes +0
+    return std::tuple(p.x(), p.y(), p.z());
+  };
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(key(a), a) < std::pair(key(b), b);
+  });
+  std::vector<std::uint32_t> to(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+    to[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? to[order[i - 1]] : order[i];
+  renumber(mesh, to, repairs);
+}
+
+/// Directed sides that no opposite one cancels, each with its surplus.
+struct Border {
+  std::uint32_t from, to;
+  int count;
+};
+std::vector<Border> bordersOf(const Mesh& mesh, const MeshEdges& edges) {
+  std::vector<Border> borders;
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    int surplus = 0;
+    for (const std::uint32_t half : edges.halves(e))
+      surplus += mesh.triangles[half / 3][half % 3] == edges[e].from ? 1 : -1;
+    if (surplus > 0) borders.push_back({edges[e].from, edges[e].to, surplus});
+    if (surplus < 0) borders.push_back({edges[e].to, edges[e].from, -surplus});
+  }
+  return borders;
+}
+
+/// Merges the vertices of open edges that lie within `weld_mm` of an earlier one.
+void weldBorders(Mesh& mesh, MeshRepairs& repairs) {
+  const MeshEdges edges(mesh);
+  std::vector<std::uint32_t> open;
+  for (std::uint32_t e = 0; e < edges.size(); ++e)
+    if (edges.halves(e).size() == 1) open.insert(open.end(), {edges[e].from, edges[e].to});
+  if (open.empty()) return;
+  std::sort(open.begin(), open.end());
+  open.erase(std::unique(open.begin(), open.end()), open.end());
+
+  using Cell = std::array<std::int64_t, 3>;
+  std::map<Cell, std::vector<std::uint32_t>> kept;
+  std::vector<std::uint32_t> to(mesh.vertices.size());
+  std::iota(to.begin(), to.end(), 0U);
+  for (const std::uint32_t v : open) {
+    const Vec3d& p = mesh.vertices[v];
+    Cell cell;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      cell[axis] = static_cast<std::int64_t>(std::floor(p[static_cast<int>(axis)] / weld_mm));
+    double nearest = weld_mm * weld_mm;
+    for (int neighbour = 0; neighbour < 27; ++neighbour) {
+      const auto found = kept.find({cell[0] + neighbour % 3 - 1, cell[1] + neighbour / 3 % 3 - 1,
+                                    cell[2] + neighbour / 9 - 1});
+      if (found == kept.end()) continue;
+      for (const std::uint32_t other : found->second) {
+        const double distance = (mesh.vertices[other] - p).lengthSqr();
+        if (distance >= nearest) continue;
+        nearest = distance;
+        to[v] = other;
+      }
+    }
+    if (to[v] == v) {
+      kept[cell].push_back(v);
+    } else {
+      ++repairs.welded_vertices;
+    }
+  }
+  if (repairs.welded_vertices > 0) renumber(mesh, to, repairs);
+}
+
+/// Of triangles with the same corners one stays. Two that face opposite ways are a wall between two
+/// solids and both go, unless most of the mesh is like that: then it is a surface with two sides,
+/// and one stays.
+void dropDuplicates(Mesh& mesh, MeshRepairs& repairs) {
+  struct Corners {
+    Triangle sorted;
+    std::uint32_t triangle;
+    bool even;  // the order of the corners is an even permutation of the sorted one
+  };
+  std::vector<Corners> all;
+  all.reserve(mesh.triangles.size());
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    Triangle t = mesh.triangles[i];
+    std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+    const bool even = t[1] < t[2];
+    if (!even) std::swap(t[1], t[2]);
+    all.push_back({t, i, even});
+  }
+  std::sort(all.begin(), all.end(), [](const Corners& a, const Corners& b) {
+    return std::tie(a.sorted, a.triangle) < std::tie(b.sorted, b.triangle);
+  });
+  std::vector<bool> drop(mesh.triangles.size(), false);
+  std::vector<std::uint32_t> walls;
+  for (auto begin = all.begin(); begin != all.end();) {
+    const auto end =
+        std::find_if(begin, all.end(), [&](const Corners& c) { return c.sorted != begin->sorted; });
+    const auto even = std::count_if(begin, end, [](const Corners& c) { return c.even; });
+    const auto odd = (end - begin) - even;
+    const auto stays = std::find_if(
+        begin, end, [&](const Corners& c) { return even == odd || c.even == (even > odd); });
+    for (auto it = begin; it != end; ++it) drop[it->triangle] = it != stays;
+    if (even == odd) walls.push_back(stays->triangle);
+    begin = end;
+  }
+  if (4 * walls.size() < mesh.triangles.size())
+    for (const std::uint32_t wall : walls) drop[wall] = true;
+  std::vector<Triangle> left;
+  for (std::size_t i = 0; i < drop.size(); ++i)
+    if (!drop[i]) left.push_back(mesh.triangles[i]);
+  repairs.duplicate_triangles += mesh.triangles.size() - left.size();
+  mesh.triangles = std::move(left);
+}
+
+/// Turns triangles to agree across the edges where two meet. Returns the part of every triangle.
+std::vector<std::uint32_t> orient(Mesh& mesh, MeshRepairs& repairs) {
+  const MeshEdges edges(mesh);
+  const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
+  constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> edge_of(3 * std::size_t{count}, none);
+  for (std::uint32_t e = 0; e < edges.size(); ++e)
+    if (edges.halves(e).size() == 2)
+      for (const std::uint32_t half : edges.halves(e)) edge_of[half] = e;
+
+  std::vector<std::uint32_t> part(count, none);
+  std::vector<bool> flip(count, false);
+  std::uint32_t parts = 0;
+  std::vector<std::uint32_t> members;
+  for (std::uint32_t seed = 0; seed < count; ++seed) {
+    if (part[seed] != none) continue;
+    members.assign(1, seed);
+    part[seed] = parts;
+    std::size_t flipped = 0;
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      const std::uint32_t triangle = members[i];
+      flipped += flip[triangle];
+      for (std::uint32_t side = 0; side < 3; ++side) {
+        const std::uint32_t half = 3 * triangle + side;
+        if (edge_of[half] == none) continue;
+        const auto both = edges.halves(edge_of[half]);
+        const std::uint32_t other = both[0] == half ? both[1] : both[0];
+        if (part[other / 3] != none) continue;
+        const bool agree = mesh.triangles[triangle][side] != mesh.triangles[other / 3][other % 3];
+        flip[other / 3] = flip[triangle] == agree;
+        part[other / 3] = parts;
+        members.push_back(other / 3);
+      }
+    }
+    const bool turn_all = 2 * flipped > members.size();
+    for (const std::uint32_t triangle : members) {
+      if (flip[triangle] == turn_all) continue;
+      std::swap(mesh.triangles[triangle][1], mesh.triangles[triangle][2]);
+      ++repairs.flipped_triangles;
+    }
+    ++parts;
+  }
+  return part;
+}
+
+/// 4π times what the triangle adds to the generalized winding number at p (van Oosterom and
+/// Strackee 1983).
+double solidAngle(const Mesh& mesh, const Triangle& t, const Vec3d& p) {
+  const Vec3d a = mesh.vertices[t[0]] - p;
+  const Vec3d b = mesh.vertices[t[1]] - p;
+  const Vec3d c = mesh.vertices[t[2]] - p;
+  const double la = a.length();
+  const double lb = b.length();
+  const double lc = c.length();
+  return 2 * std::atan2(a.dot(b.cross(c)),
+                        la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+}
+
+/// Turns the parts of negative volume that no other part surrounds.
+void turnInsideOut(Mesh& mesh, const std::vector<std::uint32_t>& part, MeshRepairs& repairs) {
+  struct Part {
+    double volume = 0;
+    openvdb::math::BBox<Vec3d> bounds;
+    std::vector<std::uint32_t> triangles;
+  };
+  std::vector<Part> parts(part.empty() ? 0 : *std::max_element(part.begin(), part.end()) + 1);
+  for (std::uint32_t i = 0; i < part.size(); ++i) {
+    Part& own = parts[part[i]];
+    own.triangles.push_back(i);
+    for (const std::uint32_t v : mesh.triangles[i]) own.bounds.expand(mesh.vertices[v]);
+  }
+  for (Part& own : parts) {
+    const Vec3d centre = own.bounds.getCenter();
+    for (const std::uint32_t i : own.triangles) {
+      const Triangle& t = mesh.triangles[i];
+      own.volume += (mesh.vertices[t[0]] - centre)
+                        .dot((mesh.vertices[t[1]] - centre).cross(mesh.vertices[t[2]] - centre)) /
+                    6;
+    }
+  }
+  for (const Part& own : parts) {
+    if (!(own.volume < 0)) continue;
+    const Triangle& first = mesh.triangles[own.triangles.front()];
+    const Vec3d p =
+        (mesh.vertices[first[0]] + mesh.vertices[first[1]] + mesh.vertices[first[2]]) / 3;
+    double around = 0;
+    for (const Part& other : parts) {
+      if (&other == &own || !other.bounds.isInside(own.bounds)) continue;
+      for (const std::uint32_t i : other.triangles)
+        around += solidAngle(mesh, mesh.triangles[i], p);
+    }
+    if (std::abs(around) > 2 * std::numbers::pi) continue;
+    for (const std::uint32_t i : own.triangles)
+      std::swap(mesh.triangles[i][1], mesh.triangles[i][2]);
+    ++repairs.turned_parts;
+  }
+}
+
+void fill(Mesh& mesh, const std::vector<std::uint32_t>& loop) {
+  if (loop.size() == 3) {
+    mesh.triangles.push_back({loop[0], loop[1], loop[2]});
+    return;
+  }
+  Vec3d middle(0, 0, 0);
+  double length = 0;
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    const Vec3d& a = mesh.vertices[loop[i]];
+    const Vec3d& b = mesh.vertices[loop[(i + 1) % loop.size()]];
+    middle += 0.5 * (a + b) * (b - a).length();
+    length += (b - a).length();
+  }
+  const auto centre = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.push_back(length > 0 ? middle / length : mesh.vertices[loop[0]]);
+  for (std::size_t i = 0; i < loop.size(); ++i)
+    mesh.triangles.push_back({loop[i], loop[(i + 1) % loop.size()], centre});
+}
+
+/// Fills the loops that the borders form, taken apart wherever they touch themselves.
+void closeHoles(Mesh& mesh, MeshRepairs& repairs) {
+  std::map<std::uint32_t, std::vector<std::uint32_t>> next;  // against the borders
+  for (const Border& border : bordersOf(mesh, MeshEdges(mesh))) {
+    repairs.boundary_edges += static_cast<std::uint64_t>(border.count);
+    next[border.to].insert(next[border.to].end(), static_cast<std::size_t>(border.count),
+                           border.from);
+  }
+  std::map<std::uint32_t, std::size_t> place;  // in the path
+  for (auto& [start, ways] : next) {
+    while (!ways.empty()) {
+      std::vector<std::uint32_t> path{start};
+      place = {{start, 0}};
+      while (!path.empty()) {
+        std::vector<std::uint32_t>& onward = next[path.back()];
+        if (onward.empty()) break;  // back at the start
+        const std::uint32_t v = onward.back();
+        onward.pop_back();
+        const auto seen = place.find(v);
+        if (seen == place.end()) {
+          place[v] = path.size();
+          path.push_back(v);
+          continue;
+        }
+        const std::vector<std::uint32_t> loop(
+            path.begin() + static_cast<std::ptrdiff_t>(seen->second), path.end());
+        for (const std::uint32_t w : loop)
+          if (w != v) place.erase(w);
+        path.resize(seen->second + 1);
+        fill(mesh, loop);
+        ++repairs.closed_holes;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> MeshRepairs::lines() const {
+  std::vector<std::string> lines;
+  const auto tell = [&](std::uint64_t count, const char* one, const char* many) {
+    if (count > 0) lines.push_back(std::to_string(count) + ' ' + (count == 1 ? one : many));
+  };
+  tell(welded_vertices, "vertex at a border welded to one within a micrometre",
+       "vertices at borders welded to others within a micrometre");
+  tell(degenerate_triangles, "degenerate triangle dropped", "degenerate triangles dropped");
+  tell(duplicate_triangles, "duplicate triangle dropped", "duplicate triangles dropped");
+  tell(flipped_triangles, "triangle turned to agree with its neighbours",
+       "triangles turned to agree with their neighbours");
+  tell(turned_parts, "part turned that was inside out", "parts turned that were inside out");
+  tell(boundary_edges, "boundary edge", "boundary edges");
+  tell(closed_holes, "hole filled", "holes filled");
+  return lines;
+}
+
+Mesh repaired(Mesh mesh, MeshRepairs& repairs) {
+  weldEqual(mesh, repairs);
+  weldBorders(mesh, repairs);
+  dropDuplicates(mesh, repairs);
+  const std::vector<std::uint32_t> part = orient(mesh, repairs);
+  turnInsideOut(mesh, part, repairs);
+  const std::size_t given = mesh.triangles.size();
+  closeHoles(mesh, repairs);
+  repairs.filling_triangles = mesh.triangles.size() - given;
+  return mesh;
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "vdbdither/mesh.h"
+
+namespace vdbdither {
+
+/// What was done to a mesh, by kind; all zero for a mesh that needed nothing.
+struct MeshRepairs {
+  std::uint64_t welded_vertices = 0;       ///< merged with another within a micrometre, at a border
+  std::uint64_t degenerate_triangles = 0;  ///< dropped: two corners are one
+  std::uint64_t duplicate_triangles = 0;  ///< dropped: the same corners as another, or its opposite
+  std::uint64_t flipped_triangles = 0;    ///< turned to agree with their neighbours
+  std::uint64_t turned_parts = 0;         ///< parts that were inside out
+  std::uint64_t boundary_edges = 0;       ///< sides that no triangle met from the other side
+  std::uint64_t closed_holes = 0;         ///< loops of them that were filled
+  std::uint64_t filling_triangles = 0;    ///< what they were filled with: the last of the mesh
+
+  /// One line for each kind that occurred.
+  [[nodiscard]] std::vector<std::string> lines() const;
+};
+
+/// A mesh that bounds a solid: every side of a triangle is met by one in the opposite direction, so
+/// that the winding number is a whole number everywhere, and positive within parts that are not
+/// cavities.
+///
+/// Vertices at the same position become one (that is not counted as a repair: file formats without
+/// shared vertices need it); at borders also those within a micrometre. Degenerate and duplicate
+/// triangles go. Triangles are turned to agree with their neighbours, parts that are inside out and
+/// in no other part are turned, and loops of borders are filled by a fan. Deterministic; the order
+/// of the triangles that stay is kept.
+///
+/// `mesh` in mm.
+Mesh repaired(Mesh mesh, MeshRepairs& repairs);
+
+}  // namespace vdbdither

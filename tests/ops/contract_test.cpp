@@ -1,0 +1,171 @@
+#include "tests/support/contract.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "io/vdb.h"
+#include "tests/support/mesh_files.h"
+#include "tests/support/scratch_folder.h"
+#include "tests/support/shapes.h"
+#include "vdbdither/chain.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/pipeline.h"
+#include "vdbdither/registry.h"
+
+namespace vdbdither {
+namespace {
+
+using test::firstBreach;
+namespace fs = std::filesystem;
+
+class Silent : public Watcher {
+ public:
+  void warn(const std::string&, const std::string&) override {}
+  void progress(const std::string&, int, int, double) override {}
+};
+
+void runChain(std::vector<Step> steps, const std::vector<std::string>& more = {}) {
+  for (const std::string& argument : more) steps.back().arguments.push_back(argument);
+  Silent silent;
+  Pipeline pipeline(steps);
+  pipeline.plan(silent);
+  pipeline.run();
+}
+
+/// Every registered operator by its example, in a folder with a part.
+class Contract : public testing::TestWithParam<const OperatorInfo*> {
+ protected:
+  void SetUp() override {
+    initializeVdb();
+    before_ = fs::current_path();
+    enter("start");
+  }
+  void TearDown() override { fs::current_path(before_); }
+
+  /// Goes to a new folder that holds nothing but a part.
+  fs::path enter(const std::string& name) {
+    const fs::path folder = scratch_.path() / name;
+    fs::create_directories(folder);
+    fs::current_path(folder);
+    const Mesh part =
+        test::transformed(test::torusMesh({0, 0, 0}, 0.7, 0.3, 40), {20, 35, 0}, {0.11, 0.2, 0.3});
+    const std::string bytes = test::binaryStl(part);
+    std::ofstream("part.stl", std::ios::binary)
+        .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    return folder;
+  }
+
+  [[nodiscard]] static std::vector<Step> example() {
+    return parseChain(splitWords(std::string(GetParam()->example)));
+  }
+
+  test::ScratchFolder scratch_;
+  fs::path before_;
+};
+
+TEST_P(Contract, ItsExampleNamesItAndRuns) {
+  const std::vector<Step> steps = example();
+  EXPECT_TRUE(GetParam()->transport ||
+              std::any_of(steps.begin(), steps.end(),
+                          [](const Step& step) { return step.verb == GetParam()->name; }));
+  const fs::path folder = enter("example");
+  runChain(steps);
+  EXPECT_GT(test::filesUnder(folder).size(), 1U);
+}
+
+TEST_P(Contract, SlabHeightAndThreadsChangeNoByte) {
+  const fs::path reference = enter("reference");
+  runChain(example());
+  const auto expected = test::filesUnder(reference);
+  for (const std::vector<std::string>& more :
+       std::vector<std::vector<std::string>>{{"--slab", "8"},
+                                             {"--slab", "24", "--threads", "2"},
+                                             {"--slab", "all"},
+                                             {"--threads", "1"}}) {
+    const fs::path folder = enter(more[0] + more[1]);
+    runChain(example(), more);
+    EXPECT_TRUE(test::filesUnder(folder) == expected) << more[0] << " " << more[1];
+  }
+}
+
+TEST_P(Contract, ItKeepsWhatAFilterPromises) {
+  const std::vector<Step> steps = example();
+  const auto step = std::find_if(steps.begin(), steps.end(),
+                                 [](const Step& s) { return s.verb == GetParam()->name; });
+  const std::unique_ptr<Operator> made = GetParam()->make();
+  auto* filter = dynamic_cast<Filter*>(made.get());
+  if (!filter) GTEST_SKIP() << "no filter";
+  std::vector<Step> upstream(steps.begin(), step);
+  upstream.push_back({"write", {"upstream.vdb"}});
+  runChain(upstream);
+  const VdbContents contents = readVdb("upstream.vdb");
+  const Schema schema = schemaOf(contents, "upstream.vdb");
+
+  std::vector<std::string> arguments = step->arguments;
+  if (const auto output = std::find(arguments.begin(), arguments.end(), "-o");
+      output != arguments.end()) {
+    arguments.erase(output, output + 2);
+  }
+  Options options;
+  filter->declare(options);
+  options.parse(arguments);
+  filter->plan(schema);
+  for (const int height : {8, 40})
+    EXPECT_EQ(firstBreach(*filter, schema, contents.grids, height), "");
+}
+
+std::string nameOf(const testing::TestParamInfo<const OperatorInfo*>& info) {
+  std::string name;
+  bool capital = true;
+  for (const char c : info.param->name) {
+    if (c != '-') name += static_cast<char>(capital ? std::toupper(c) : c);
+    capital = c == '-';
+  }
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Operators, Contract,
+                         testing::ValuesIn(registeredOperators().begin(),
+                                           registeredOperators().end()),
+                         nameOf);
+
+/// Reads the layer above, and says or does not say so.
+class LookAbove : public Filter {
+ public:
+  explicit LookAbove(bool honest) : honest_(honest) {}
+  void declare(Options&) override {}
+  Schema plan(const Schema& in) override { return in; }
+  [[nodiscard]] std::vector<Read> reads() const override {
+    return {{"solid", {0, honest_ ? 1 : 0}}};
+  }
+  [[nodiscard]] Grids run(const Slab& in) const override {
+    const auto solid = openvdb::gridConstPtrCast<openvdb::BoolGrid>(in.grids.at("solid"));
+    const auto result = openvdb::BoolGrid::create(false);
+    for (int z = in.core.begin; z < in.core.end; ++z) {
+      if (solid->tree().getValue({3, 3, z + 1})) result->tree().setValueOn({3, 3, z}, true);
+    }
+    return {{"solid", result}};
+  }
+
+ private:
+  bool honest_;
+};
+
+TEST(ContractCheck, CatchesAReachThatLies) {
+  initializeVdb();
+  Schema schema;
+  schema.lattice.box = openvdb::CoordBBox({0, 0, 0}, {7, 7, 39});
+  const auto solid = openvdb::BoolGrid::create(false);
+  for (int z = 0; z < 40; z += 8) solid->tree().setValueOn({3, 3, z + 3}, true);
+  schema.grids["solid"] = solid->copyGridWithNewTree();
+  const Grids whole{{"solid", solid}};
+  EXPECT_EQ(firstBreach(LookAbove(true), schema, whole, 8), "");
+  EXPECT_EQ(
+      firstBreach(LookAbove(false), schema, whole, 8),
+      "'solid' depends on the slab, or on what lies beyond the declared reach, in layers 0 to 7");
+}
+
+}  // namespace
+}  // namespace vdbdither

@@ -1,0 +1,94 @@
+#include "tests/support/contract.h"
+
+#include "io/vdb.h"
+#include "vdbdither/layers.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/window.h"
+
+namespace vdbdither::test {
+
+namespace {
+
+using openvdb::CoordBBox;
+
+/// Two grids have the same digest where their voxels in `range`, values and states, are the same.
+std::string digest(const GridConstPtr& grid, ZRange range) {
+  // A range of leaves never equals that of a whole grid, so the join copies, and cuts what is
+  // outside.
+  const std::vector<Layers> pieces{{grid, {range.begin - 4096, range.end + 4096}}};
+  return archiveBytes({{{"grid", pruned(joinLayers(pieces, range))}}, {}}, VdbCodec::mask);
+}
+
+/// `grid` within `range`; outside, every voxel of `box` is active and holds rubbish.
+GridConstPtr spoiled(const GridConstPtr& grid, ZRange range, const CoordBBox& box) {
+  const std::vector<Layers> pieces{{grid, {range.begin - 4096, range.end + 4096}}};
+  const openvdb::GridBase::Ptr copy = joinLayers(pieces, range)->deepCopyGrid();
+  const auto fill = [&](auto& typed, const auto& rubbish) {
+    for (const ZRange outside :
+         {ZRange{box.min().z(), range.begin}, ZRange{range.end, box.max().z() + 1}}) {
+      if (outside.empty()) continue;
+      CoordBBox part = box;
+      part.min().z() = outside.begin;
+      part.max().z() = outside.end - 1;
+      typed.denseFill(part, rubbish, true);
+    }
+  };
+  if (const auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(copy)) fill(*floats, -0.011F);
+  if (const auto normals = openvdb::gridPtrCast<openvdb::Vec3SGrid>(copy)) {
+    fill(*normals, openvdb::Vec3s(0.6F, 0.0F, -0.8F));
+  }
+  if (const auto bits = openvdb::gridPtrCast<openvdb::BoolGrid>(copy)) fill(*bits, true);
+  if (const auto integers = openvdb::gridPtrCast<openvdb::Int32Grid>(copy)) fill(*integers, 7);
+  return copy;
+}
+
+Slab slabOf(const Filter& filter, const Schema& in, const Grids& whole, ZRange core) {
+  const ZRange layers = in.lattice.layers();
+  Slab slab{core, reached(core, widest(filter.reads()), layers), {}};
+  for (const Read& read : filter.reads()) {
+    slab.grids[read.grid] =
+        spoiled(whole.at(read.grid), reached(core, read.reach, layers), in.lattice.box);
+  }
+  return slab;
+}
+
+std::string layersText(ZRange range) {
+  return "layers " + std::to_string(range.begin) + " to " + std::to_string(range.end - 1);
+}
+
+}  // namespace
+
+std::string firstBreach(const Filter& filter, const Schema& in, const Grids& whole, int height) {
+  const ZRange layers = in.lattice.layers();
+  const Grids expected = filter.run(slabOf(filter, in, whole, layers));
+  for (int begin = alignedToLeaves(layers).begin; begin < layers.end; begin += height) {
+    const ZRange core = intersection({begin, begin + height}, layers);
+    const Slab slab = slabOf(filter, in, whole, core);
+    std::map<std::string, std::string> before;
+    for (const auto& [name, grid] : slab.grids) before[name] = digest(grid, layers);
+    const Grids made = filter.run(slab);
+    for (const auto& [name, grid] : slab.grids) {
+      if (digest(grid, layers) != before[name]) return "its input '" + name + "' was changed";
+    }
+    for (const auto& [name, grid] : made) {
+      const ZRange given = alignedToLeaves(core);
+      const CoordBBox active = grid->evalActiveVoxelBoundingBox();
+      if (!active.empty() && (active.min().z() < core.begin || active.max().z() >= core.end)) {
+        return "'" + name + "' has voxels outside " + layersText(core);
+      }
+      const auto all = expected.find(name);
+      if (all == expected.end()) return "'" + name + "' is not made of the whole volume";
+      if (digest(grid, intersection(given, layers)) != digest(all->second, core)) {
+        return "'" + name +
+               "' depends on the slab, or on what lies beyond the declared reach, in " +
+               layersText(core);
+      }
+    }
+    Slab empty{core, slab.valid, {}};
+    for (const Read& read : filter.reads()) empty.grids[read.grid] = in.grids.at(read.grid);
+    if (filter.run(empty).size() != made.size()) return "it makes other grids of an empty slab";
+  }
+  return "";
+}
+
+}  // namespace vdbdither::test
