@@ -145,6 +145,11 @@ class MeshToSdf : public Source {
     mesh = repaired(std::move(mesh), repairs);
     if (mesh.triangles.empty())
       throw DataError("the mesh has no surface: all its triangles are degenerate or cancel");
+    const std::size_t sides = 3 * (mesh.triangles.size() - repairs.filling_triangles);
+    if (2 * repairs.boundary_edges > sides)
+      throw DataError("the triangles enclose nothing: " + std::to_string(repairs.boundary_edges) +
+                      " of their " + std::to_string(sides) +
+                      " sides meet no other; join them in a mesh editor first");
     const std::vector<std::string> lines = repairs.lines();
     if (strict_ && !lines.empty())
       throw DataError("the mesh needs repair, which --strict forbids: " + lines.front() +

@@ -135,6 +135,24 @@ TEST_F(Mesh2Sdf, CarriesThePrinterProfile) {
   EXPECT_THAT(schema.metadata.at("vdbdither:printer"), HasSubstr("mine"));
 }
 
+TEST_F(Mesh2Sdf, RepairsOpenMeshesUnlessStrict) {
+  Mesh open = test::boxMesh({1, 2, 3}, {2, 2.5, 3.25});
+  open.triangles.pop_back();
+  writeObj(path_, open);
+  const Schema schema = plan({"--pitch", "0.1,0.1,0.05"});
+  EXPECT_LT(distanceAt(schema, Coord(15, 22, 62)), 0);
+  EXPECT_EQ(refusal<DataError>({"--pitch", "0.1,0.1,0.05", "--strict"}),
+            "the mesh needs repair, which --strict forbids: 3 boundary edges and more");
+}
+
+TEST_F(Mesh2Sdf, RefusesTrianglesThatEncloseNothing) {
+  Mesh loose = test::boxMesh({1, 2, 3}, {2, 2.5, 3.25});
+  loose.triangles = {loose.triangles[0], loose.triangles[2]};
+  writeObj(path_, loose);
+  EXPECT_THAT(refusal<DataError>({"--pitch", "0.1,0.1,0.05"}),
+              HasSubstr("the triangles enclose nothing: "));
+}
+
 TEST_F(Mesh2Sdf, RefusesWhatItCannotMean) {
   EXPECT_EQ(refusal<UsageError>({}), "give either --printer NAME or --pitch DX,DY,DZ");
   EXPECT_EQ(refusal<UsageError>({"--pitch", "1,2"}),
