@@ -41,19 +41,19 @@ std::vector<std::uint32_t> bayerRanks(const Coord& size) {
 class Mask : public Source {
  public:
   void declare(Options& options) override {
-    options.triple("size", size_, "N", "Period of the tile along x, y, z, voxels, 1 to 256.");
+    options.triple("size", size_, "N", "Period of the tile along x, y, z, voxels, 1 to 256");
     options.choice("kind", kind_, {"void-and-cluster", "white", "bayer"},
-                   "How the ranks are ordered: blue noise, white noise, or ordered dither.");
+                   "How the ranks are ordered: blue noise, white noise, or ordered dither");
     options.choice("kernel", kernel_, {"peters", "gauss", "axis-mix"},
                    "Void and cluster: the Gaussian filtered on the DFT, sampled, or mixed with its "
-                   "lattice planes.");
+                   "lattice planes");
     options.triple("sigma", sigma_, "S",
-                   "Void and cluster: standard deviation of the Gaussian along x, y, z, voxels.");
+                   "Void and cluster: standard deviation of the Gaussian along x, y, z, voxels");
     options.number("plane-sigma", plane_sigma_, 0.3, 16,
-                   "axis-mix: standard deviation in the lattice planes, voxels.");
+                   "axis-mix: standard deviation in the lattice planes, voxels");
     options.number("space-weight", space_weight_, 0, 1e6,
-                   "axis-mix: weight of the Gaussian in space.");
-    options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the random start.");
+                   "axis-mix: weight of the Gaussian in space");
+    options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the random start");
   }
 
   Schema plan() override {
@@ -152,7 +152,8 @@ class Mask : public Source {
 }  // namespace
 
 extern const OperatorInfo mask{
-    "mask", "Makes a periodic tile of dither thresholds", "mask --size 16 --sigma 1.1 -o mask.vdb",
+    "mask", "A periodic tile of dither thresholds, by void and cluster",
+    "mask --size 16 --sigma 1.1 -o mask.vdb",
     []() -> std::unique_ptr<Operator> { return std::make_unique<Mask>(); }};
 
 }  // namespace vdbdither

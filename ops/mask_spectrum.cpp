@@ -23,15 +23,15 @@ using openvdb::Coord;
 class MaskSpectrum : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", file_, "JSON file that will hold the spectra.");
+    options.positional("file", file_, "JSON file that will hold the spectra");
     options.triple("pitch", pitch_mm_, "MM",
-                   "Pitch of the lattice that the mask is meant for; only its proportions count.");
+                   "Pitch of the lattice that the mask is meant for; only its proportions count");
     options.number("step", step_degrees_, 0.5, 45,
-                   "Step of the facets' polar and azimuthal angle for projections, degrees.");
-    options.number("plane-step", plane_step_degrees_, 0.5, 45, "The same for voxel planes.");
+                   "Step of the facets' polar and azimuthal angle for projections, degrees");
+    options.number("plane-step", plane_step_degrees_, 0.5, 45, "The same for voxel planes");
     options.integer("levels", levels_, 0, 99,
-                    "Thresholded masks are looked at for this many evenly spaced thresholds.");
-    options.flag("overwrite", overwrite_, "Replace a file that is there already.");
+                    "Thresholded masks are looked at for this many evenly spaced thresholds");
+    options.flag("overwrite", overwrite_, "Replace a file that is there already");
   }
 
   void plan(const Schema& in) override {

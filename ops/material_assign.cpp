@@ -45,14 +45,14 @@ class MaterialAssign : public Filter {
   void declare(Options& options) override {
     options.text("material", material_, "NAME",
                  "One material for all: a name of the printer's, or NAME=#rrggbb. The printer's "
-                 "first, else white, unless given.");
+                 "first, else white, unless given");
     options.text("parts", parts_, "NAME,...",
-                 "A material for each part, in the order of the meshes.");
+                 "A material for each part, in the order of the meshes");
     options.text("shell", shell_, "MM:NAME,...",
                  "Layers under the printed surface from the outside in, each with its thickness, "
                  "as in 0.2mm:white,0.5mm:black. "
-                 "Depth is the distance from a voxel's centre to that of the nearest empty voxel.");
-    options.text("core", core_, "NAME", "What lies beneath the shell.");
+                 "Depth is the distance from a voxel's centre to that of the nearest empty voxel");
+    options.text("core", core_, "NAME", "What lies beneath the shell");
   }
 
   Schema plan(const Schema& in) override {
@@ -211,7 +211,7 @@ class MaterialAssign : public Filter {
 
 extern const OperatorInfo material_assign;
 const OperatorInfo material_assign = {
-    "material-assign", "Give every printed voxel a material",
+    "material-assign", "The material of every printed voxel",
     "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign --shell 0.5mm:white "
     "--core clear ! slice-export out",
     [] { return std::unique_ptr<Operator>(std::make_unique<MaterialAssign>()); }};

@@ -19,8 +19,8 @@ namespace {
 class ReadOperator : public Source {
  public:
   void declare(Options& options) override {
-    options.positional("file", path_, "the .vdb to read; - or nothing is standard input", false);
-    options.text("grids", names_, "NAME,NAME", "only these grids");
+    options.positional("file", path_, "The .vdb to read; - or nothing is standard input", false);
+    options.text("grids", names_, "NAME,NAME", "Only these grids");
   }
 
   Schema plan() override {
@@ -125,7 +125,7 @@ class ReadOperator : public Source {
 }  // namespace
 
 extern const OperatorInfo read{
-    "read", "take slabs from a .vdb file or from standard input",
+    "read", "Grids from a .vdb file or from standard input",
     "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! normals -o normals.vdb",
     [] { return std::unique_ptr<Operator>(std::make_unique<ReadOperator>()); }, true};
 

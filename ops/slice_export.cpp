@@ -52,25 +52,25 @@ struct LayerOutput {
 class SliceExport : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("folder", folder_, "Folder that will hold the stack.");
+    options.positional("folder", folder_, "Folder that will hold the stack");
     options.choice("format", format_, {"png", "png1", "png8", "exr"},
                    "png: 32-bit RGBA in the colours of the materials. png1: a stack of 1 bit a "
                    "voxel for each material, in a folder "
                    "of its own. png8: grey, 255 where printed, else 0. exr: material index, and "
                    "distance and normal where "
-                   "they are there.");
-    options.text("prefix", prefix_, "TEXT", "What the file names begin with.");
-    options.integer("digits", digits_, 1, 9, "Digits of the running number, zeros in front.");
-    options.integer("first", first_, 0, 1000000, "Number of the lowest layer.");
-    options.integer("padding", padding_, 0, 100000, "Empty voxels added on each side in x and y.");
+                   "they are there");
+    options.text("prefix", prefix_, "TEXT", "What the file names begin with");
+    options.integer("digits", digits_, 1, 9, "Digits of the running number, zeros in front");
+    options.integer("first", first_, 0, 1000000, "Number of the lowest layer");
+    options.integer("padding", padding_, 0, 100000, "Empty voxels added on each side in x and y");
     options.flag("flip-x", flip_x_,
-                 "Mirror left to right. By default a slice is seen from above: x to the right.");
+                 "Mirror left to right. By default a slice is seen from above: x to the right");
     options.flag("flip-y", flip_y_,
                  "Mirror top to bottom. By default a slice is seen from above: the top row has the "
-                 "greatest y.");
+                 "greatest y");
     options.text("background", background_, "COLOUR",
-                 "Colour of what is not printed, in png: #rrggbb, or r,g,b,a of 0 to 255.");
-    options.flag("overwrite", overwrite_, "Replace a stack that is there already.");
+                 "Colour of what is not printed, in png: #rrggbb, or r,g,b,a of 0 to 255");
+    options.flag("overwrite", overwrite_, "Replace a stack that is there already");
   }
 
   void plan(const Schema& in) override {
@@ -391,7 +391,7 @@ class SliceExport : public Sink {
 
 extern const OperatorInfo slice_export;
 const OperatorInfo slice_export = {
-    "slice-export", "Write one image per layer, with a manifest and a preview",
+    "slice-export", "One image per layer, with a manifest and a preview",
     "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign ! slice-export out",
     [] { return std::unique_ptr<Operator>(std::make_unique<SliceExport>()); }};
 

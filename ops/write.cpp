@@ -21,9 +21,9 @@ namespace {
 class WriteOperator : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", path_, "the .vdb to write; - or nothing is standard output", false);
-    options.choice("codec", codec_, {"blosc", "mask", "none"}, "how a file's voxels are packed");
-    options.flag("overwrite", overwrite_, "replace the file if it is there");
+    options.positional("file", path_, "The .vdb to write; - or nothing is standard output", false);
+    options.choice("codec", codec_, {"blosc", "mask", "none"}, "How a file's voxels are packed");
+    options.flag("overwrite", overwrite_, "Replace the file if it is there");
   }
 
   void plan(const Schema& in) override {
@@ -90,7 +90,7 @@ class WriteOperator : public Sink {
 }  // namespace
 
 extern const OperatorInfo write{
-    "write", "put slabs into a .vdb file, or on standard output",
+    "write", "Grids into a .vdb file or to standard output",
     "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! dither -o solid.vdb",
     [] { return std::unique_ptr<Operator>(std::make_unique<WriteOperator>()); }, true};
 

@@ -11,27 +11,27 @@ namespace vdbdither {
 
 void RunOptions::declare(Options& options) {
   options.text("input", input, "FILE.vdb",
-               "read this file instead of standard input, where the chain has no source");
+               "Read this file instead of standard input, where the chain has no source");
   options.letter('i');
   options.text("output", output, "FILE.vdb",
-               "write this file instead of standard output, where the chain has no sink");
+               "Write this file instead of standard output, where the chain has no sink");
   options.letter('o');
-  options.flag("overwrite", overwrite, "replace an output that is already there");
-  options.integer("threads", threads, 0, 4096, "threads to work with; 0 takes all");
-  options.text("slab", slab, "N|auto|all", "layers worked on at a time, a multiple of 8");
+  options.flag("overwrite", overwrite, "Replace an output that is already there");
+  options.integer("threads", threads, 0, 4096, "Threads to work with; 0 takes all");
+  options.text("slab", slab, "N|auto|all", "Layers worked on at a time, a multiple of 8");
   options.text("memory", memory, "SIZE|auto",
-               "what the run may use, such as 4GiB; auto is most of what is free");
+               "What the run may use, such as 4GiB; auto is most of what is free");
   options.text("layers", layers, "A:B",
-               "only the layers A to B-1, counted from the bottom of the job");
-  options.flag("stream", stream, "refuse operators that need the whole volume at once");
-  options.flag("explain", explain, "say what would be done, and at what cost, and stop");
-  options.flag("json", json, "report time, voxels, bytes and peak memory of every stage as JSON");
-  options.flag("quiet", quiet, "no words but warnings and errors");
+               "Only the layers A to B-1, counted from the bottom of the job");
+  options.flag("stream", stream, "Refuse operators that need the whole volume at once");
+  options.flag("explain", explain, "Say what would be done, and at what cost, and stop");
+  options.flag("json", json, "Report time, voxels, bytes and peak memory of every stage as JSON");
+  options.flag("quiet", quiet, "No words but warnings and errors");
   options.letter('q');
-  options.flag("verbose", verbose, "one line for every stage");
+  options.flag("verbose", verbose, "One line for every stage");
   options.letter('v');
-  options.flag("version", version, "say which version this is");
-  options.flag("help", help, "this text");
+  options.flag("version", version, "Say which version this is");
+  options.flag("help", help, "This text");
   options.letter('h');
 }
 

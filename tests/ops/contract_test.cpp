@@ -75,6 +75,21 @@ TEST_P(Contract, ItsExampleNamesItAndRuns) {
   EXPECT_GT(test::filesUnder(folder).size(), 1U);
 }
 
+TEST_P(Contract, ItsWordsAreOfOneStyle) {
+  const auto expect_style = [](const std::string& sentence) {
+    ASSERT_FALSE(sentence.empty());
+    EXPECT_FALSE(std::islower(static_cast<unsigned char>(sentence.front())) &&
+                 sentence.find(':') > 9)
+        << sentence;
+    EXPECT_NE(sentence.back(), '.') << sentence;
+  };
+  Options options;
+  const std::unique_ptr<Operator> made = GetParam()->make();
+  made->declare(options);
+  expect_style(std::string(GetParam()->summary));
+  for (const Option& option : options.all()) expect_style(option.help);
+}
+
 TEST_P(Contract, SlabHeightAndThreadsChangeNoByte) {
   const fs::path reference = enter("reference");
   runChain(example());
