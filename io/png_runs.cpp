@@ -232,7 +232,7 @@ void RunDeflater::encodeRow(std::uint32_t y) {
   std::size_t run = row_begin_;
   std::size_t above = above_begin_;
   std::uint64_t byte = 0;
-  const auto matchAbove = [&](std::uint64_t length) {
+  const auto match_above = [&](std::uint64_t length) {
     open_match_ += static_cast<std::uint32_t>(length);
     byte += length;
     if (byte < stride_ || open_match_ == max_match) closeMatch();
@@ -251,12 +251,12 @@ void RunDeflater::encodeRow(std::uint32_t y) {
     }
     const std::uint64_t agreeing = comparable ? agreement(byte, run, above) : 0;
     if (open_match_) {
-      matchAbove(std::min(agreeing, max_match - open_match_));
+      match_above(std::min(agreeing, max_match - open_match_));
       continue;
     }
     if (byte == 0) {
       if (agreeing >= DeflateWriter::min_match) {
-        matchAbove(agreeing);
+        match_above(agreeing);
       } else {
         deflate_.literal(0);
         ++byte;
@@ -286,7 +286,7 @@ void RunDeflater::encodeRow(std::uint32_t y) {
       deflate_.match(static_cast<std::uint32_t>(best), static_cast<std::uint32_t>(distance));
       byte += best;
     } else if (agreeing >= DeflateWriter::min_match) {
-      matchAbove(agreeing);
+      match_above(agreeing);
     } else {
       const std::uint64_t end = byte < first_end ? first_end : endByte(run);
       for (; byte < end; ++byte) {

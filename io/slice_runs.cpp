@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <cstddef>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -15,7 +15,8 @@ using openvdb::Coord;
 
 /// Eight rows of eight layers, the unit in which a tree is walked: row 8·y + z, as a leaf orders
 /// its voxels.
-constexpr int strip_rows = leaf_layers * leaf_layers;
+constexpr std::ptrdiff_t strip_rows = 64;
+static_assert(strip_rows == leaf_layers * leaf_layers);
 
 /// The runs of a strip, row after row.
 struct StripRuns {
@@ -172,13 +173,13 @@ std::vector<RunImage> slice(const Grid& grid, const SliceFrame& frame, ZRange la
           size += strip.begin[row + 1] - strip.begin[row];
       }
       image.runs.reserve(size);
-      const auto addBlankRows = [&] {
+      const auto add_blank_rows = [&] {
         for (int i = 0; i < frame.padding; ++i) {
           image.runs.push_back({image.width, 0});
           image.row_begin.push_back(image.runs.size());
         }
       };
-      addBlankRows();
+      add_blank_rows();
       const int rows = frame.box.dim().y();
       for (int i = 0; i < rows; ++i) {
         const int y = frame.flip_y ? frame.box.min().y() + i : frame.box.max().y() - i;
@@ -189,7 +190,7 @@ std::vector<RunImage> slice(const Grid& grid, const SliceFrame& frame, ZRange la
         if (frame.flip_x) mirror(std::span(image.runs).subspan(image.row_begin.back()));
         image.row_begin.push_back(image.runs.size());
       }
-      addBlankRows();
+      add_blank_rows();
     });
   }
   return images;

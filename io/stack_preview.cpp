@@ -78,7 +78,7 @@ void StackPreview::add(int z, RunImage&& slice, std::uint64_t filled) {
 
 void StackPreview::look(const RunImage& slice, Hit* hits) {
   std::iota(next_ray_.begin(), next_ray_.end(), 0U);
-  const auto nextRay = [&](std::uint32_t ray) {
+  const auto next_ray = [&](std::uint32_t ray) {
     while (next_ray_[ray] != ray) ray = next_ray_[ray] = next_ray_[next_ray_[ray]];
     return ray;
   };
@@ -87,7 +87,7 @@ void StackPreview::look(const RunImage& slice, Hit* hits) {
     for (const Run& run : slice.row(y)) {
       if (run.value) {
         const std::uint32_t end = first_ray_[run.end];
-        for (std::uint32_t ray = nextRay(first_ray_[begin]); ray < end; ray = nextRay(ray)) {
+        for (std::uint32_t ray = next_ray(first_ray_[begin]); ray < end; ray = next_ray(ray)) {
           hits[ray] = {static_cast<float>((slice.height - 1 - y) * pitch_mm_.y()), run.value};
           next_ray_[ray] = ray + 1;
         }
@@ -109,11 +109,11 @@ std::vector<StackPreview::Pixel> StackPreview::front() const {
   for (int row = 0; row < front_rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
       Surface& pixel = surface[static_cast<std::size_t>(row) * columns_ + column];
-      std::array<Hit, fineness * fineness> hits;
+      std::array<Hit, std::size_t{fineness} * fineness> hits;
       float nearest_mm = std::numeric_limits<float>::infinity();
       for (int i = 0; i < fineness * fineness; ++i) {
-        hits[i] = hits_[static_cast<std::size_t>(row * fineness + i / fineness) * rays +
-                        column * fineness + i % fineness];
+        const int ray = column * fineness + i % fineness;
+        hits[i] = hits_[static_cast<std::size_t>(row * fineness + i / fineness) * rays + ray];
         if (hits[i].value) nearest_mm = std::min(nearest_mm, hits[i].depth_mm);
       }
       // At an outline the rays of a pixel meet surfaces far apart; the nearest gives the slope.
@@ -239,7 +239,7 @@ RunImage StackPreview::picture() const {
   image.height = static_cast<std::uint32_t>(std::max(front_rows_, slice_rows_) + 2 * margin);
   image.row_begin.push_back(0);
   const auto byte = [](float value) {
-    return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 255.0F) + 0.5F);
+    return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0F, 255.0F)));
   };
   for (std::uint32_t y = 0; y < image.height; ++y) {
     std::uint32_t x = 0;
@@ -247,10 +247,10 @@ RunImage StackPreview::picture() const {
       image.runs.push_back({++x, rgba(byte(pixel.red), byte(pixel.green), byte(pixel.blue))});
     };
     const Pixel behind{background[0], background[1], background[2]};
-    const auto putMargin = [&] {
+    const auto put_margin = [&] {
       for (int i = 0; i < margin; ++i) put(behind);
     };
-    putMargin();
+    put_margin();
     for (const auto& [panel, rows] : panels) {
       // Both stand on the bottom margin.
       const int row = static_cast<int>(y) - (static_cast<int>(image.height) - margin - rows);
@@ -258,7 +258,7 @@ RunImage StackPreview::picture() const {
         put(row < 0 || row >= rows ? behind
                                    : panel[static_cast<std::size_t>(row) * columns_ + column]);
       }
-      putMargin();
+      put_margin();
     }
     image.row_begin.push_back(image.runs.size());
   }

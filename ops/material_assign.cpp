@@ -152,7 +152,7 @@ class MaterialAssign : public Filter {
   void takeParts(Int32Tree& material, const Int32Tree& part) const {
     const auto count = static_cast<std::int32_t>(table_.size());
     std::atomic<std::uint64_t> strays = 0;
-    const auto materialOf = [&](std::int32_t index, std::uint64_t voxels) {
+    const auto material_of = [&](std::int32_t index, std::uint64_t voxels) {
       if (index >= 1 && index <= count) return index;
       strays += voxels;
       return count;
@@ -161,12 +161,12 @@ class MaterialAssign : public Filter {
     auto tile = material.beginValueOn();
     tile.setMaxDepth(Int32Tree::ValueOnIter::LEAF_DEPTH - 1);
     for (; tile; ++tile)
-      tile.setValue(materialOf(part.getValue(tile.getCoord()), tile.getVoxelCount()));
+      tile.setValue(material_of(part.getValue(tile.getCoord()), tile.getVoxelCount()));
     openvdb::tree::LeafManager<Int32Tree> leaves(material);
     leaves.foreach ([&](Int32Tree::LeafNodeType& leaf, std::size_t) {
       const openvdb::tree::ValueAccessor<const Int32Tree> accessor(part);
       for (auto voxel = leaf.beginValueOn(); voxel; ++voxel) {
-        voxel.setValue(materialOf(accessor.getValue(voxel.getCoord()), 1));
+        voxel.setValue(material_of(accessor.getValue(voxel.getCoord()), 1));
       }
     });
     if (strays > 0) report().count("voxels_of_no_part", static_cast<double>(strays));

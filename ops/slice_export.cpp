@@ -90,8 +90,8 @@ class SliceExport : public Sink {
                        "another folder");
     }
     frame_ = {in.lattice.box, padding_, flip_x_, flip_y_};
-    if (static_cast<std::int64_t>(in.lattice.box.dim().x()) + 2 * padding_ > 1 << 24 ||
-        static_cast<std::int64_t>(in.lattice.box.dim().y()) + 2 * padding_ > 1 << 24) {
+    if (in.lattice.box.dim().x() + std::int64_t{2} * padding_ > 1 << 24 ||
+        in.lattice.box.dim().y() + std::int64_t{2} * padding_ > 1 << 24) {
       throw UsageError("slices would be more than 16777216 voxels wide");
     }
     if (format_ == "exr") planChannels();
@@ -217,7 +217,7 @@ class SliceExport : public Sink {
     };
     const auto store = [&](const Layer& layer) { storeLayer(*layer); };
     tbb::parallel_pipeline(
-        2 * tbb::this_task_arena::max_concurrency(),
+        std::size_t{2} * tbb::this_task_arena::max_concurrency(),
         tbb::make_filter<void, Layer>(tbb::filter_mode::serial_in_order, take) &
             tbb::make_filter<Layer, Layer>(tbb::filter_mode::parallel, encode) &
             tbb::make_filter<Layer, void>(tbb::filter_mode::serial_in_order, store));
@@ -268,8 +268,8 @@ class SliceExport : public Sink {
 
   [[nodiscard]] Bytes encodeChannels(const Slab& in, const LayerOutput& layer) const {
     const openvdb::CoordBBox& box = frame_.box;
-    const auto fillRow = [&](std::uint32_t row, std::span<float> values, const auto& grid,
-                             const auto& convert) {
+    const auto fill_row = [&](std::uint32_t row, std::span<float> values, const auto& grid,
+                              const auto& convert) {
       std::fill(values.begin(), values.end(), convert(grid.background()));
       const int from_top = static_cast<int>(row) - padding_;
       if (from_top < 0 || from_top >= box.dim().y()) return;
@@ -290,12 +290,12 @@ class SliceExport : public Sink {
           begin = run.end;
         }
       } else if (name == "distance") {
-        fillRow(row, values, *findGrid<openvdb::FloatGrid>(in.grids, "surface"),
-                [](float value) { return value; });
+        fill_row(row, values, *findGrid<openvdb::FloatGrid>(in.grids, "surface"),
+                 [](float value) { return value; });
       } else {
         const int axis = name.back() - 'x';
-        fillRow(row, values, *findGrid<openvdb::Vec3SGrid>(in.grids, "N"),
-                [axis](const openvdb::Vec3s& normal) { return normal[axis]; });
+        fill_row(row, values, *findGrid<openvdb::Vec3SGrid>(in.grids, "N"),
+                 [axis](const openvdb::Vec3s& normal) { return normal[axis]; });
       }
     };
     return encodeExr(frame_.width(), frame_.height(),

@@ -9,6 +9,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -25,7 +26,8 @@ using openvdb::Coord;
 using Int32Leaf = openvdb::Int32Tree::LeafNodeType;
 
 constexpr int edge = leaf_layers;
-constexpr int plane = edge * edge;
+constexpr std::ptrdiff_t plane = 64;
+static_assert(plane == edge * edge);
 constexpr int volume = edge * edge * edge;
 constexpr float infinite = std::numeric_limits<float>::infinity();
 
@@ -174,7 +176,8 @@ class StripTransform {
   }
 
   /// to[i] = min(to[i], source[begin + i] + added) for i < count.
-  static void lower(float* to, const Block& source, int begin, int count, float added) {
+  static void lower(float* to, const Block& source, std::ptrdiff_t begin, std::ptrdiff_t count,
+                    float added) {
     if (source.state == Block::State::zero) {
       for (int i = 0; i < count; ++i) to[i] = std::min(to[i], added);
     } else if (source.state == Block::State::mixed) {
@@ -203,7 +206,7 @@ class StripTransform {
       for (int step = -reach(1); step <= reach(1); ++step) {
         const int from = y + step + margin * edge;
         for (int x = 0; x < edge; ++x) {
-          lower(block.squares.data() + (x * edge + y) * edge, along_y_[from / edge],
+          lower(&block.squares[(x * edge + y) * edge], along_y_[from / edge],
                 (x * edge + from % edge) * edge, edge, squares_[1][std::abs(step)]);
         }
       }
@@ -225,7 +228,7 @@ class StripTransform {
     for (int x = 0; x < edge && !all_beyond; ++x) {
       for (int step = -reach(0); step <= reach(0); ++step) {
         const int from = x + step + margin * edge;
-        lower(squares.data() + x * plane, blocks_[index + from / edge], from % edge * plane, plane,
+        lower(&squares[x * plane], blocks_[index + from / edge], from % edge * plane, plane,
               squares_[0][std::abs(step)]);
       }
     }
