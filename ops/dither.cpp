@@ -25,7 +25,7 @@ ThresholdMask readMask(const std::filesystem::path& path) {
     const GridConstPtr grid = readGrid(path, "mask");
     const auto mask = openvdb::gridConstPtrCast<FloatGrid>(grid);
     if (!mask) throw DataError("a mask is a grid of float, not of " + grid->valueType());
-    return ThresholdMask::fromGrid(*mask);
+    return ThresholdMask(*mask);
   } catch (const DataError& error) {
     throw DataError(std::string("--mask: ") + error.what());
   }

@@ -3,6 +3,7 @@
 #include <bit>
 #include <cassert>
 #include <string>
+#include <utility>
 
 #include <openvdb/tools/Dense.h>
 
@@ -35,23 +36,13 @@ int positiveModulo(int value, int modulus) {
 
 }  // namespace
 
-ThresholdMask::ThresholdMask(const Coord& size, std::span<const float> values)
-    : size_(size), blocks_(size.offsetBy(7) >> 3) {
-  values_.resize(512 * openvdb::CoordBBox(Coord(1), blocks_).volume());
-  const openvdb::CoordBBox tile(Coord(0), size.offsetBy(-1));
-  assert(values.size() == tile.volume());
-  auto value = values.begin();
-  for (auto ijk = tile.begin(); ijk; ++ijk) values_[index(*ijk)] = *value++;
+ThresholdMask::ThresholdMask(const Coord& size, std::vector<float> values)
+    : size_(size), values_(std::move(values)) {
+  assert(values_.size() == static_cast<std::size_t>(size.x()) * static_cast<std::size_t>(size.y()) *
+                               static_cast<std::size_t>(size.z()));
 }
 
-std::size_t ThresholdMask::index(const Coord& ijk) const {
-  const Coord block = ijk >> 3;
-  const int number = (block.x() * blocks_.y() + block.y()) * blocks_.z() + block.z();
-  const int voxel = (ijk.x() & 7) << 6 | (ijk.y() & 7) << 3 | (ijk.z() & 7);
-  return static_cast<std::size_t>(number) << 9 | static_cast<std::size_t>(voxel);
-}
-
-ThresholdMask ThresholdMask::fromGrid(const openvdb::FloatGrid& grid) {
+ThresholdMask::ThresholdMask(const openvdb::FloatGrid& grid) {
   const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
   if (box.empty()) throw DataError("a mask needs active voxels, and there are none");
   if (box.min() != Coord(0) || box.volume() != grid.activeVoxelCount()) {
@@ -59,16 +50,16 @@ ThresholdMask ThresholdMask::fromGrid(const openvdb::FloatGrid& grid) {
                     std::to_string(grid.activeVoxelCount()) + " are active from " +
                     text(box.min()) + " to " + text(box.max()));
   }
-  std::vector<float> values(box.volume());
-  openvdb::tools::Dense<float, openvdb::tools::LayoutZYX> dense(box, values.data());
+  size_ = box.dim();
+  values_.resize(box.volume());
+  openvdb::tools::Dense<float, openvdb::tools::LayoutZYX> dense(box, values_.data());
   openvdb::tools::copyToDense(grid, dense);
-  for (const float value : values) {
+  for (const float value : values_) {
     if (!(value > 0.0F && value < 1.0F)) {
       throw DataError("a mask holds thresholds between 0 and 1, exclusive; here one is " +
                       std::to_string(value));
     }
   }
-  return {box.dim(), values};
 }
 
 ThresholdMask ThresholdMask::whiteNoise(std::uint64_t seed) {
@@ -84,8 +75,10 @@ float ThresholdMask::operator()(const Coord& ijk) const {
     // The odd multiples of 2⁻²⁴: every one is a float, and none is 0 or 1.
     return static_cast<float>(2 * (hash >> 41U) + 1) * 0x1p-24F;
   }
-  return values_[index({positiveModulo(ijk.x(), size_.x()), positiveModulo(ijk.y(), size_.y()),
-                        positiveModulo(ijk.z(), size_.z())})];
+  const int row =
+      positiveModulo(ijk.x(), size_.x()) * size_.y() + positiveModulo(ijk.y(), size_.y());
+  return values_[static_cast<std::size_t>(row) * static_cast<std::size_t>(size_.z()) +
+                 static_cast<std::size_t>(positiveModulo(ijk.z(), size_.z()))];
 }
 
 }  // namespace vdbdither

@@ -147,7 +147,7 @@ TEST_F(MaskFile, IsReadAtTheAbsoluteIndexModuloItsSize) {
   auto grid = filled(CoordBBox(Coord(0), Coord(1, 10, 3)), 0.5F);
   float value = 0.01F;
   for (auto voxel = grid->beginValueOn(); voxel; ++voxel) voxel.setValue(value += 0.01F);
-  const ThresholdMask mask = ThresholdMask::fromGrid(*grid);
+  const ThresholdMask mask(*grid);
   for (const Coord& at : {Coord(0), Coord(1, 2, 3), Coord(0, 10, 1)}) {
     EXPECT_EQ(mask(at), grid->tree().getValue(at));
     EXPECT_EQ(mask(at + Coord(20, -33, 400)), grid->tree().getValue(at));
