@@ -568,9 +568,10 @@ double MeshDistance::memoryBytes() const {
          features_.memoryBytes();
 }
 
-/// How far a feature can matter to a voxel.
+/// How far a feature can matter to a voxel: for the band's sake twice the band and a voxel
+/// diagonal, and up to another voxel because boxes are rounded outwards.
 double MeshDistance::reachMm() const {
-  return band_.mm > 0 ? band_.mm : 2 * backgroundMm() + lattice_.diagonalMm();
+  return band_.mm > 0 ? band_.mm : 2 * (backgroundMm() + lattice_.diagonalMm());
 }
 
 void MeshDistance::append(const CoordBBox& voxels, std::vector<std::uint32_t> features,
