@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <mutex>
+#include <sstream>
 #include <unistd.h>
 #include <vector>
 
@@ -35,10 +36,14 @@ class ReadOperator : public Source {
     } else {
       VdbContents contents = readVdb(path_);
       schema = schemaOf(contents, "'" + path_ + "'");
-      // The file's own box may be smaller than what it holds; every layer counts.
-      constexpr ZRange every{std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};
-      slabs_.push_back({every, every, std::move(contents.grids)});
+      // Where the file does not say, every layer counts: its box may be smaller than what it holds.
+      ZRange held{std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};
+      if (const auto some = schema.metadata.extract(layers_key)) {
+        std::istringstream(some.mapped()) >> held.begin >> held.end;
+      }
+      slabs_.push_back({held, held, std::move(contents.grids)});
     }
+    first_layer_ = schema.lattice.layers().begin;
     keepNamed(schema.grids);
     kept_ = schema.grids;
     return schema;
@@ -57,6 +62,7 @@ class ReadOperator : public Source {
   [[nodiscard]] Grids run(ZRange core) const override {
     const std::lock_guard lock(mutex_);
     if (isPipe()) takeFrames(core);
+    checkCovered(core);
     Grids result;
     for (const auto& [name, prototype] : kept_) {
       std::vector<Layers> pieces;
@@ -83,15 +89,19 @@ class ReadOperator : public Source {
     }
     // The closing frame must be seen before anything downstream is published.
     if (core.end >= frames_->schema().lattice.layers().end && !ended_) ended_ = !frames_->next();
+  }
+
+  /// What was made with --layers lacks the others, which are not empty.
+  void checkCovered(ZRange core) const {
     int covered = core.begin;
     for (const Slab& slab : slabs_) {
       if (slab.core.begin <= covered) covered = std::max(covered, slab.core.end);
     }
     if (covered < core.end) {
-      throw DataError("standard input lacks layer " +
-                      std::to_string(covered - frames_->schema().lattice.layers().begin) +
+      throw DataError((isPipe() ? "standard input" : "'" + path_ + "'") + " lacks layer " +
+                      std::to_string(covered - first_layer_) +
                       "; where only some layers are wanted, give --layers to the last operator of "
-                      "the pipe alone");
+                      "the chain alone");
     }
   }
 
@@ -116,6 +126,7 @@ class ReadOperator : public Source {
   std::string path_;
   std::string names_;
   Grids kept_;
+  int first_layer_ = 0;
   std::unique_ptr<FrameReader> frames_;
   mutable std::mutex mutex_;
   mutable std::vector<Slab> slabs_;

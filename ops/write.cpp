@@ -47,6 +47,8 @@ class WriteOperator : public Sink {
       beginFrames();
       frames_->slab(in);
     } else {
+      if (written_.empty()) written_.begin = in.core.begin;
+      written_.end = in.core.end;
       for (const auto& [name, grid] : in.grids) pieces_[name].push_back({grid, in.core});
     }
   }
@@ -63,10 +65,15 @@ class WriteOperator : public Sink {
       pieces.clear();
     }
     if (grids.empty()) grids = schema_.grids;
+    VdbContents contents = contentsOf(schema_, grids);
+    if (written_ != schema_.lattice.layers()) {
+      contents.metadata[layers_key] =
+          std::to_string(written_.begin) + " " + std::to_string(written_.end);
+    }
     const VdbCodec codec = codec_ == "none"   ? VdbCodec::none
                            : codec_ == "mask" ? VdbCodec::mask
                                               : VdbCodec::blosc;
-    writeVdb(output_->path(), contentsOf(schema_, grids), codec, path_);
+    writeVdb(output_->path(), contents, codec, path_);
     output_->commit();
   }
 
@@ -84,6 +91,7 @@ class WriteOperator : public Sink {
   std::optional<FrameWriter> frames_;
   bool begun_ = false;
   std::optional<StagedOutput> output_;
+  ZRange written_;
   std::map<std::string, std::vector<Layers>> pieces_;
 };
 

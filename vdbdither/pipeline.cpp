@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <mutex>
 #include <sstream>
 #include <sys/resource.h>
 
@@ -129,6 +130,7 @@ class Pipeline::Stage : public Reporter {
   void warn(const std::string& text) override { watcher->warn(name(), text); }
 
   void count(const std::string& what, double value) override {
+    const std::lock_guard lock(count_mutex_);
     report_.counts.emplace_back(what, value);
   }
 
@@ -192,6 +194,7 @@ class Pipeline::Stage : public Reporter {
   Schema out_;
   std::vector<Read> reads_;
   StageReport report_;
+  std::mutex count_mutex_;
 };
 
 Pipeline::Pipeline(const std::vector<Step>& steps) {

@@ -74,6 +74,11 @@ class Damage(ProgramTest):
         some = self.succeed("mesh2sdf", "part.stl", *MIMAKI, "--layers", "0:32")
         self.succeed("normals", "--layers", "4:12", "-o", "out.vdb", input=some)
 
+    def test_layers_that_a_file_lacks_are_an_error(self):
+        self.succeed("mesh2sdf", "part.stl", *MIMAKI, "--layers", "0:32", "-o", "some.vdb")
+        self.refuse(1, "'some.vdb' lacks layer 32;", "normals", "-i", "some.vdb", "-o", "out.vdb")
+        self.succeed("normals", "-i", "some.vdb", "--layers", "4:12", "-o", "out.vdb")
+
     def test_what_is_no_vdb_is_refused(self):
         for text in (b"hello\n", bytes(5000), self.random.randbytes(5000)):
             self.refuse_frames(text)
