@@ -15,7 +15,8 @@ struct VdbContents {
   std::map<std::string, std::string, std::less<>> metadata;
 };
 
-/// Metadata of a file that holds only some layers of its job: the first and the one behind the last.
+/// Metadata of a file that holds only some layers of its job: the first and the one behind the
+/// last.
 inline constexpr const char* layers_key = "vdbdither:layers";
 
 /// How the voxels of an archive are packed. Inactive values are never stored.

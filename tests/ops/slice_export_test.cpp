@@ -282,7 +282,8 @@ TEST(SliceExport, RefusesWhatItCannotSlice) {
                                "it with material-assign"));
   job = smallJob();
   job.schema.grids["material"] = openvdb::FloatGrid::create();
-  EXPECT_THAT(planned(job, {}), ThrowsMessage<DataError>("grid 'material' is of float, not of int32"));
+  EXPECT_THAT(planned(job, {}),
+              ThrowsMessage<DataError>("grid 'material' is of float, not of int32"));
   job = smallJob();
   job.schema.lattice.box = CoordBBox();
   EXPECT_THAT(planned(job, {}),
