@@ -7,6 +7,7 @@
 #include "io/printer_profile.h"
 #include "ops/kernels/mesh_distance.h"
 #include "ops/kernels/mesh_repair.h"
+#include "ops/kernels/part_index.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
@@ -70,7 +71,9 @@ void rotate(Mesh& mesh, const Vec3d& degrees) {
 class MeshToSdf : public Source {
  public:
   void declare(Options& options) override {
-    options.positionals("mesh", paths_, "Mesh files: STL, OBJ or PLY; several make one part");
+    options.positionals(
+        "mesh", paths_,
+        "Mesh files: STL, OBJ or PLY; several are printed as one, and 'part' tells them apart");
     options.text("printer", printer_, "NAME|FILE.json", "The printer whose lattice to use");
     options.text("pitch", pitch_, "DX,DY,DZ", "The lattice's pitch, in place of a printer's");
     options.choice("unit", unit_, {"mm", "cm", "m", "in", "um"}, "What the mesh's numbers mean");
@@ -97,18 +100,30 @@ class MeshToSdf : public Source {
     band_ = bandFrom(band_text_);
     auto mesh = std::make_shared<Mesh>(readMeshes());
     placeMesh(*mesh);
-    repair(*mesh);
     schema.lattice = latticeAround(*mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
+    planParts(*mesh, lattice);
+    repair(*mesh);
     schema.leaves_per_row = leavesPerRow(*mesh, lattice);
     field_ = std::make_unique<MeshDistance>(std::move(mesh), lattice, band_, extras_);
-    schema.grids = gridsOf(field_->run({lattice.box.min().z(), lattice.box.min().z()}));
+    schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
 
-  [[nodiscard]] double memoryBytes() const override { return field_->memoryBytes(); }
+  [[nodiscard]] double memoryBytes() const override {
+    double bytes = field_->memoryBytes();
+    for (const MeshDistance& part : parts_) bytes += part.memoryBytes();
+    return bytes;
+  }
 
-  [[nodiscard]] Grids run(ZRange core) const override { return gridsOf(field_->run(core)); }
+  [[nodiscard]] Grids run(ZRange core) const override {
+    Grids grids = gridsOf(field_->run(core));
+    if (parts_.empty()) return grids;
+    std::vector<openvdb::FloatGrid::ConstPtr> surfaces;
+    for (const MeshDistance& part : parts_) surfaces.push_back(part.run(core).surface);
+    grids["part"] = partIndex(surfaces);
+    return grids;
+  }
 
  private:
   Vec3d pitchMm(Schema& schema) const {
@@ -164,12 +179,28 @@ class MeshToSdf : public Source {
     report().count("closed_holes", static_cast<double>(repairs.closed_holes));
   }
 
-  Mesh readMeshes() const {
+  Mesh readMeshes() {
     std::vector<Mesh> meshes;
     for (const std::string& path : paths_) {
       meshes.push_back(readMesh(path, [this](const std::string& text) { report().warn(text); }));
+      triangle_counts_.push_back(meshes.back().triangles.size());
     }
     return joined(std::move(meshes));
+  }
+
+  /// A field of its own for each file of several. What is repaired in them is told of the whole.
+  void planParts(const Mesh& all, const Lattice& lattice) {
+    if (paths_.size() < 2) return;
+    std::size_t first = 0;
+    for (const std::size_t count : triangle_counts_) {
+      Mesh part{all.vertices, {}};
+      const auto begin = all.triangles.begin() + static_cast<std::ptrdiff_t>(first);
+      part.triangles.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
+      MeshRepairs repairs;
+      parts_.emplace_back(std::make_shared<Mesh>(repaired(std::move(part), repairs)), lattice,
+                          band_);
+      first += count;
+    }
   }
 
   void placeMesh(Mesh& mesh) const {
@@ -267,6 +298,8 @@ class MeshToSdf : public Source {
 
   Band band_;
   std::unique_ptr<MeshDistance> field_;
+  std::vector<std::size_t> triangle_counts_;  ///< of every file
+  std::vector<MeshDistance> parts_;           ///< of every file, where there are several
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 """A chain gives the same slices however it is run."""
 
 import itertools
+import json
 import os
 import pathlib
 import unittest
@@ -53,6 +54,16 @@ class Chain(ProgramTest):
         slices = self.assert_all_agree(self.chain(printer, "part.stl"), (("8", 2), ("64", 1), ("all", 2)))
         stack.check(self.folder / "out")
         self.assertGreater(len(set(slices)), 30)
+
+    def test_several_meshes_get_a_material_each(self):
+        meshes.write_stl(self.folder / "left.stl", meshes.box((1, 1, 1)))
+        meshes.write_stl(self.folder / "right.stl", meshes.box((2, 1, 1), (1.2, 0, 0)))
+        self.succeed("mesh2sdf", "left.stl", "right.stl", "--printer", "mimaki-3duj-553", "!", "dither", "--mask", "none",
+                     "!", "material-assign", "--parts", "white,black", "!", "slice-export", "out")
+        white, black = json.loads((self.folder / "out/manifest.json").read_text())["materials"]
+        self.assertEqual((white["name"], black["name"]), ("white", "black"))
+        self.assertAlmostEqual(black["voxels"] / white["voxels"], 2, delta=0.1)
+        stack.check(self.folder / "out")
 
     def test_fused_piped_and_filed_runs_of_any_slab_and_threads_agree_on_mimaki(self):
         self.assert_every_way_gives_the_same_on("mimaki-3duj-553")

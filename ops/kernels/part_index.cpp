@@ -1,0 +1,84 @@
+#include "ops/kernels/part_index.h"
+
+#include <limits>
+#include <vector>
+
+#include <openvdb/tools/Prune.h>
+#include <tbb/parallel_for.h>
+
+namespace vdbdither {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using openvdb::Int32Tree;
+
+namespace {
+
+using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree>;
+using Leaf = Int32Tree::LeafNodeType;
+
+/// Tiles of what is inside a part alone; a later call yields to what an earlier one left.
+void fillInterior(const FloatGrid& surface, int part, Int32Tree& parts) {
+  for (auto tile = surface.tree().cbeginValueOff(); tile; ++tile) {
+    if (tile.isVoxelValue() || !(*tile < 0)) continue;
+    const CoordBBox box = tile.getBoundingBox();
+    for (int x = box.min().x(); x <= box.max().x(); x += Leaf::DIM) {
+      for (int y = box.min().y(); y <= box.max().y(); y += Leaf::DIM) {
+        for (int z = box.min().z(); z <= box.max().z(); z += Leaf::DIM) {
+          const Coord origin(x, y, z);
+          if (!parts.probeConstLeaf(origin) && !parts.isValueOn(origin)) {
+            parts.addTile(1, origin, part, true);
+          }
+        }
+      }
+    }
+  }
+}
+
+void fillLeaf(Leaf& leaf, std::vector<Accessor>& surfaces) {
+  for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
+    const Coord ijk = leaf.offsetToGlobalCoord(n);
+    int nearest = 0;
+    float least = std::numeric_limits<float>::infinity();
+    for (std::size_t part = 0; part < surfaces.size() && !(least < 0); ++part) {
+      float distance = 0;
+      const bool active = surfaces[part].probeValue(ijk, distance);
+      if ((active || distance < 0) && distance < least) {
+        least = distance;
+        nearest = static_cast<int>(part) + 1;
+      }
+    }
+    if (nearest) {
+      leaf.setValueOn(n, nearest);
+    } else {
+      leaf.setValueOff(n, 0);
+    }
+  }
+}
+
+}  // namespace
+
+openvdb::Int32Grid::Ptr partIndex(std::span<const FloatGrid::ConstPtr> surfaces) {
+  const auto grid = openvdb::Int32Grid::create(0);
+  grid->setName("part");
+  Int32Tree& parts = grid->tree();
+  for (const FloatGrid::ConstPtr& surface : surfaces) {
+    grid->setTransform(surface->transform().copy());
+    for (auto leaf = surface->tree().cbeginLeaf(); leaf; ++leaf) parts.touchLeaf(leaf->origin());
+  }
+  std::vector<Leaf*> leaves;
+  parts.getNodes(leaves);
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+    std::vector<Accessor> accessors;
+    for (const FloatGrid::ConstPtr& surface : surfaces) accessors.emplace_back(surface->tree());
+    fillLeaf(*leaves[i], accessors);
+  });
+  for (std::size_t part = 0; part < surfaces.size(); ++part) {
+    fillInterior(*surfaces[part], static_cast<int>(part) + 1, parts);
+  }
+  openvdb::tools::prune(parts);
+  return grid;
+}
+
+}  // namespace vdbdither
