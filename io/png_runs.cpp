@@ -58,7 +58,6 @@ class RunDeflater {
     std::uint32_t index = 0;     ///< in runs_
   };
   static constexpr int orders = 3;
-  static constexpr std::array<std::uint32_t, orders> order_runs = {6, 3, 1};
   static constexpr std::size_t table_size = 4096;
 
   [[nodiscard]] std::uint32_t begin(std::size_t run) const {
