@@ -14,5 +14,5 @@ find vdbdither io ops tests \( -name '*.h' -o -name '*.cpp' \) -print0 | xargs -
 say "linting in $root/build/lint (minutes the first time)"
 quietly cmake --preset clang -B build/lint -DCMAKE_BUILD_TYPE=Debug -DBUILD_TESTING=ON \
   -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON '-DCMAKE_CXX_CLANG_TIDY=clang-tidy-14;--quiet'
-if [ $# = 0 ]; then set -- vdbdither_program; fi
+if [ $# = 0 ]; then set -- libvdbdither.a CMakeFiles/vdbdither_program.dir/vdbdither/main.cpp.o; fi
 quietly cmake --build build/lint --target "$@" -- -k 0

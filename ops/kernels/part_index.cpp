@@ -60,7 +60,7 @@ void fillLeaf(Leaf& leaf, std::vector<Accessor>& surfaces) {
 }  // namespace
 
 openvdb::Int32Grid::Ptr partIndex(std::span<const FloatGrid::ConstPtr> surfaces) {
-  const auto grid = openvdb::Int32Grid::create(0);
+  auto grid = openvdb::Int32Grid::create(0);
   grid->setName("part");
   Int32Tree& parts = grid->tree();
   for (const FloatGrid::ConstPtr& surface : surfaces) {
