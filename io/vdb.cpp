@@ -302,23 +302,14 @@ Schema schemaOf(const VdbContents& contents, const std::string& where) {
       throw DataError(where + ": grids '" + first.getName() + "' and '" + name +
                       "' lie on different lattices");
     }
-    const GridBase::Ptr empty = grid->copyGridWithNewTree();
-    dropFileStatistics(*empty);
-    schema.grids[name] = empty;
+    schema.grids[name] = grid->copyGridWithNewTree();
   }
   if (const auto found = schema.metadata.find(box_key); found != schema.metadata.end()) {
     schema.lattice.box = parseBox(found->second, where);
     schema.metadata.erase(found);
   } else {
-    for (const auto& [name, grid] : contents.grids) {
-      const auto min = grid->getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MIN);
-      const auto max = grid->getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MAX);
-      if (min && max) {
-        schema.lattice.box.expand(CoordBBox(Coord(min->value()), Coord(max->value())));
-      } else {
-        schema.lattice.box.expand(grid->evalActiveVoxelBoundingBox());
-      }
-    }
+    for (const auto& [name, grid] : contents.grids)
+      schema.lattice.box.expand(grid->evalActiveVoxelBoundingBox());
   }
   schema.metadata.erase("creator");
   return schema;
