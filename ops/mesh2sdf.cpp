@@ -4,7 +4,8 @@
 #include <numbers>
 
 #include "io/mesh_reader.h"
-#include "io/printer_profile.h"
+#include "io/target_lattice.h"
+#include "ops/kernels/held_band.h"
 #include "ops/kernels/mesh_distance.h"
 #include "ops/kernels/mesh_repair.h"
 #include "ops/kernels/part_index.h"
@@ -96,8 +97,9 @@ class MeshToSdf : public Source {
 
   Schema plan() override {
     Schema schema;
-    const Vec3d pitch_mm = pitchMm(schema);
+    const Vec3d pitch_mm = targetPitchMm(printer_, pitch_, schema);
     band_ = bandFrom(band_text_);
+    held_band_mm_ = band_.leastMm(pitch_mm);
     auto mesh = std::make_shared<Mesh>(readMeshes());
     placeMesh(*mesh);
     schema.lattice = latticeAround(*mesh, pitch_mm);
@@ -126,28 +128,6 @@ class MeshToSdf : public Source {
   }
 
  private:
-  Vec3d pitchMm(Schema& schema) const {
-    if (printer_.empty() == pitch_.empty())
-      throw UsageError("give either --printer NAME or --pitch DX,DY,DZ");
-    if (!printer_.empty()) {
-      const PrinterProfile profile = readPrinterProfile(printer_);
-      schema.metadata["vdbdither:printer"] = toJson(profile);
-      return profile.pitch_mm;
-    }
-    Vec3d pitch_mm;
-    std::size_t begin = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::size_t comma = pitch_.find(',', begin);
-      if ((comma == std::string::npos) != (axis == 2))
-        throw UsageError("--pitch: '" + pitch_ + "' is not three lengths such as 42um,84um,22um");
-      pitch_mm[axis] = parseLengthMm(std::string_view(pitch_).substr(begin, comma - begin));
-      if (!(pitch_mm[axis] >= 1e-3 && pitch_mm[axis] <= 10))
-        throw UsageError("--pitch: '" + pitch_ + "' is not between 1 um and 10 mm in every axis");
-      begin = comma + 1;
-    }
-    return pitch_mm;
-  }
-
   static Band bandFrom(const std::string& text) {
     const bool diameters = text.find_first_not_of("0123456789.") == std::string::npos;
     const double size = parseLengthMm(text);
@@ -221,11 +201,11 @@ class MeshToSdf : public Source {
     for (Vec3d& vertex : mesh.vertices) vertex -= corner;
   }
 
-  /// The voxels within a voxel diagonal of the mesh's bounding box; where y is refined, the same
-  /// region in finer voxels.
+  /// The voxels within a voxel diagonal, or the band, of the mesh's bounding box; where y is
+  /// refined, the same region in finer voxels.
   Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm) const {
     const Bounds bounds = boundsOf(mesh);
-    const double margin_mm = pitch_mm.length();
+    const double margin_mm = std::max(pitch_mm.length(), band_.greatestMm(pitch_mm));
     for (int axis = 0; axis < 3; ++axis) {
       const double furthest_mm =
           std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) + margin_mm;
@@ -276,7 +256,8 @@ class MeshToSdf : public Source {
     return *std::max_element(leaves.begin(), leaves.end());
   }
 
-  static Grids gridsOf(const DistanceGrids& made) {
+  [[nodiscard]] Grids gridsOf(const DistanceGrids& made) const {
+    setHeldBandMm(*made.surface, held_band_mm_);
     Grids grids{{"surface", made.surface}};
     if (made.normals) grids["N"] = made.normals;
     if (made.closest) grids["closest"] = made.closest;
@@ -297,6 +278,7 @@ class MeshToSdf : public Source {
   DistanceExtras extras_;
 
   Band band_;
+  double held_band_mm_ = 0;
   std::unique_ptr<MeshDistance> field_;
   std::vector<std::size_t> triangle_counts_;  ///< of every file
   std::vector<MeshDistance> parts_;           ///< of every file, where there are several

@@ -106,7 +106,9 @@ class Sink : public Operator {
 struct OperatorInfo {
   std::string_view name;     ///< the verb, kebab-case
   std::string_view summary;  ///< one sentence, no full stop
-  std::string_view example;  ///< a whole chain that runs in a folder with a `part.stl`
+  /// A whole chain that runs in a folder with a `part.stl`; others that it needs first come before,
+  /// as in a shell: `… && vdbdither …`.
+  std::string_view example;
   std::unique_ptr<Operator> (*make)();
   /// Moves grids without changing them (read, write): leaves no line in the history.
   bool transport = false;

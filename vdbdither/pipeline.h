@@ -71,6 +71,8 @@ class Pipeline {
   void planRanges();
   void planSlabs();
   void push(std::size_t index, Slab slab);
+  void pushEmpty(std::size_t index, int end);
+  void take(std::size_t index, Slab slab);
   [[nodiscard]] double expectedMemoryBytes(int slab_layers) const;
   [[nodiscard]] double memoryBudgetBytes() const;
 
