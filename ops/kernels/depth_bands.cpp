@@ -64,10 +64,12 @@ void lower(Plane& to, float added) {
 }
 
 float greatest(const Plane& squares) {
-  std::array<float, edge> most{};
-  for (std::size_t i = 0; i < squares.size(); ++i)
-    most[i % edge] = std::max(most[i % edge], squares[i]);
-  return *std::max_element(most.begin(), most.end());
+  Plane most = squares;
+  // Halves against each other, so that no lane waits for another.
+  for (std::size_t half = most.size() / 2; half >= 4; half /= 2) {
+    for (std::size_t i = 0; i < half; ++i) most[i] = std::max(most[i], most[i + half]);
+  }
+  return std::max(std::max(most[0], most[1]), std::max(most[2], most[3]));
 }
 
 int leafOrigin(int index) { return index & ~(edge - 1); }
@@ -109,6 +111,7 @@ class StripTransform {
     }
     blocks_.resize(x_blocks_ + 2 * static_cast<std::size_t>(blocksWithinReach(0)));
     rows_.resize(2 * static_cast<std::size_t>(blocksWithinReach(1)) + 1);
+    along_y_.resize(rows_.size());
     for (Row& row : rows_) row.blocks.resize(blocks_.size());
   }
 
@@ -268,19 +271,18 @@ class StripTransform {
     if (block.state != Block::State::unknown) return block;
     const int margin = blocksWithinReach(1);
     bool all_beyond = true;
-    for (int i = -margin; i <= margin; ++i) {
-      const Block& source = passZ(index, origin.offsetBy(0, i * edge, 0));
-      all_beyond = all_beyond && source.state == Block::State::beyond_reach;
+    for (int i = 0; i <= 2 * margin; ++i) {
+      along_y_[i] = &passZ(index, origin.offsetBy(0, (i - margin) * edge, 0));
+      all_beyond = all_beyond && along_y_[i]->state == Block::State::beyond_reach;
     }
-    if (passZ(index, origin).state == Block::State::zero) {
+    if (along_y_[margin]->state == Block::State::zero) {
       block.state = Block::State::zero;
       return block;
     }
     block.state = Block::State::beyond_reach;
     for (int y = 0; y < edge && !all_beyond; ++y) {
-      const Plane least = leastAround(y + margin * edge, 1, 0, [&](int i) -> const Block& {
-        return passZ(index, origin.offsetBy(0, (i - margin) * edge, 0));
-      });
+      const Plane least =
+          leastAround(y + margin * edge, 1, 0, [&](int i) -> const Block& { return *along_y_[i]; });
       for (int x = 0; x < edge; ++x) {
         for (int z = 0; z < edge; ++z) {
           const float square = least[x * edge + z];
@@ -341,6 +343,7 @@ class StripTransform {
   std::vector<float> limits_;                  ///< per band, squared
   std::vector<Block> blocks_;                  ///< the row after the pass along y, with margins
   std::vector<Row> rows_;                      ///< those around it after the pass along z
+  std::vector<const Block*> along_y_;          ///< of those, what one block needs
   int z_ = 0;
 };
 
