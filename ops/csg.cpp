@@ -117,7 +117,7 @@ class CsgOperator : public Filter {
   }
 
   [[nodiscard]] Int32Grid::Ptr emptyParts(const FloatGrid& surface) const {
-    const auto grid = Int32Grid::create(0);
+    auto grid = Int32Grid::create(0);
     grid->setName("part");
     grid->setTransform(surface.transform().copy());
     grid->insertMeta(part_count_key, openvdb::Int32Metadata(parts_));

@@ -28,7 +28,7 @@ constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{
     {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}, {"um", 0.001}}};
 
 FloatGrid::ConstPtr asFloats(const GridConstPtr& grid) {
-  if (const auto floats = openvdb::gridConstPtrCast<FloatGrid>(grid)) return floats;
+  if (auto floats = openvdb::gridConstPtrCast<FloatGrid>(grid)) return floats;
   if (const auto doubles = openvdb::gridConstPtrCast<openvdb::DoubleGrid>(grid))
     return std::make_shared<FloatGrid>(*doubles);
   return nullptr;

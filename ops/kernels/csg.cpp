@@ -54,7 +54,7 @@ void visitInsideBlocks(const FloatGrid& surface, ZRange core, const Visit& visit
 }  // namespace
 
 FloatGrid::Ptr emptyCombined(const FloatGrid& a, const FloatGrid& b) {
-  const FloatGrid::Ptr grid = emptySurface(a, std::min(a.background(), b.background()));
+  FloatGrid::Ptr grid = emptySurface(a, std::min(a.background(), b.background()));
   setHeldBandMm(*grid, std::min({heldBandMm(a), heldBandMm(b), double{grid->background()}}));
   return grid;
 }
@@ -97,7 +97,7 @@ FloatGrid::Ptr combined(const FloatGrid& a, const FloatGrid& b, Csg operation, Z
     });
   }
   const FloatGrid::Ptr empty = emptyCombined(a, b);
-  const FloatGrid::Ptr grid = surfaceOf(*empty, empty->background(), core, origins, leaves, inside);
+  FloatGrid::Ptr grid = surfaceOf(*empty, empty->background(), core, origins, leaves, inside);
   setHeldBandMm(*grid, heldBandMm(*empty));
   return grid;
 }
@@ -105,7 +105,7 @@ FloatGrid::Ptr combined(const FloatGrid& a, const FloatGrid& b, Csg operation, Z
 Int32Grid::Ptr unitedParts(const FloatGrid& a, const FloatGrid& b, const Int32Grid* a_parts,
                            const Int32Grid* b_parts, int shift, bool b_first, ZRange core) {
   using IntLeaf = openvdb::Int32Tree::LeafNodeType;
-  const auto grid = Int32Grid::create(0);
+  auto grid = Int32Grid::create(0);
   grid->setName("part");
   grid->setTransform(a.transform().copy());
 

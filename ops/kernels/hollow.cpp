@@ -31,6 +31,7 @@ openvdb::FloatGrid::Ptr hollowed(const openvdb::FloatGrid& surface, const Lattic
                                  float background_mm, ZRange core) {
   const std::vector<const FloatLeaf*> sources = leavesIn(surface.tree(), core);
   std::vector<Coord> origins;
+  origins.reserve(sources.size());
   for (const FloatLeaf* leaf : sources) origins.push_back(leaf->origin());
   std::vector<LeafValues> leaves(sources.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {

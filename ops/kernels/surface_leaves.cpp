@@ -30,7 +30,7 @@ LeafValues LeafValues::of(
 }
 
 FloatGrid::Ptr emptySurface(const FloatGrid& surface, float background_mm) {
-  const FloatGrid::Ptr grid = FloatGrid::create(background_mm);
+  FloatGrid::Ptr grid = FloatGrid::create(background_mm);
   grid->insertMeta(surface);
   grid->setTransform(surface.transform().copy());
   setHeldBandMm(*grid, double{background_mm});
@@ -40,7 +40,7 @@ FloatGrid::Ptr emptySurface(const FloatGrid& surface, float background_mm) {
 FloatGrid::Ptr surfaceOf(const FloatGrid& prototype, float background_mm, ZRange core,
                          std::span<const Coord> origins, std::span<const LeafValues> leaves,
                          std::span<const openvdb::CoordBBox> inside) {
-  const FloatGrid::Ptr grid = emptySurface(prototype, background_mm);
+  FloatGrid::Ptr grid = emptySurface(prototype, background_mm);
   for (const openvdb::CoordBBox& box : inside) grid->tree().sparseFill(box, -background_mm, false);
 
   std::vector<std::unique_ptr<FloatLeaf>> made(leaves.size());

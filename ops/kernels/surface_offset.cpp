@@ -113,6 +113,7 @@ FloatGrid::Ptr SurfaceOffset::run(const FloatGrid& surface, const FloatGrid* hei
                                   ZRange valid) const {
   const std::vector<const FloatLeaf*> sources = leavesIn(surface.tree(), core);
   std::vector<Coord> origins;
+  origins.reserve(sources.size());
   for (const FloatLeaf* leaf : sources) origins.push_back(leaf->origin());
   std::vector<LeafValues> leaves(sources.size());
   std::atomic<float> greatest = 0;
