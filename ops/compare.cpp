@@ -167,7 +167,8 @@ class Compare : public Sink {
 extern const OperatorInfo compare;
 const OperatorInfo compare{
     "compare", "Whether two .vdb hold the same voxels, and where not; exits with 1 where not",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! compare surface.vdb",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 -o surface.vdb\n"
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! compare surface.vdb",
     [] { return std::unique_ptr<Operator>(std::make_unique<Compare>()); }};
 
 }  // namespace vdbdither

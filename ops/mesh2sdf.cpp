@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "io/mesh_reader.h"
 #include "io/printer_profile.h"
@@ -100,11 +101,14 @@ class MeshToSdf : public Source {
     band_ = bandFrom(band_text_);
     auto mesh = std::make_shared<Mesh>(readMeshes());
     placeMesh(*mesh);
+    questionSize(*mesh);
     schema.lattice = latticeAround(*mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
     planParts(*mesh, lattice);
     repair(*mesh);
-    schema.leaves_per_row = leavesPerRow(*mesh, lattice);
+    const std::vector<double> leaves = leavesOfRows(*mesh, lattice);
+    schema.leaves_per_row = *std::max_element(leaves.begin(), leaves.end());
+    schema.leaves = std::accumulate(leaves.begin(), leaves.end(), 0.0);
     field_ = std::make_unique<MeshDistance>(std::move(mesh), lattice, band_, extras_);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
@@ -126,12 +130,14 @@ class MeshToSdf : public Source {
   }
 
  private:
-  Vec3d pitchMm(Schema& schema) const {
+  Vec3d pitchMm(Schema& schema) {
     if (printer_.empty() == pitch_.empty())
-      throw UsageError("give either --printer NAME or --pitch DX,DY,DZ");
+      throw UsageError(
+          "give either --printer NAME (vdbdither printers lists them) or --pitch DX,DY,DZ");
     if (!printer_.empty()) {
       const PrinterProfile profile = readPrinterProfile(printer_);
       schema.metadata["vdbdither:printer"] = toJson(profile);
+      build_mm_ = profile.build_mm;
       return profile.pitch_mm;
     }
     Vec3d pitch_mm;
@@ -221,6 +227,46 @@ class MeshToSdf : public Source {
     for (Vec3d& vertex : mesh.vertices) vertex -= corner;
   }
 
+  /// Warns of a part that is hardly meant to be as large or as small as it is.
+  void questionSize(const Mesh& mesh) const {
+    constexpr double largest_mm = 3000;
+    constexpr double least_mm = 0.1;
+    const Bounds bounds = boundsOf(mesh);
+    const Vec3d size_mm = bounds.max - bounds.min;
+    const double longest_mm = std::max({size_mm.x(), size_mm.y(), size_mm.z()});
+    const auto rounded = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4); };
+    const std::string is = "the part is " + rounded(size_mm.x()) + " x " + rounded(size_mm.y()) +
+                           " x " + rounded(size_mm.z()) + " mm";
+    if (longest_mm >= largest_mm || (longest_mm > 0 && longest_mm <= least_mm)) {
+      report().warn(is + "; " + likelierUnit(longest_mm));
+    } else if (build_mm_ != Vec3d(0, 0, 0) &&
+               (size_mm.x() > build_mm_.x() || size_mm.y() > build_mm_.y() ||
+                size_mm.z() > build_mm_.z())) {
+      report().warn(is + ", more than the " + rounded(build_mm_.x()) + " x " +
+                    rounded(build_mm_.y()) + " x " + rounded(build_mm_.z()) +
+                    " mm that the printer builds; turn it with --rotate, or see --unit and --fit");
+    }
+  }
+
+  /// The unit that brings the part nearest to the size of a hand.
+  [[nodiscard]] std::string likelierUnit(double longest_mm) const {
+    constexpr double hand_mm = 100;
+    const auto factor = [](const std::string& name) {
+      return std::find_if(units_mm.begin(), units_mm.end(),
+                          [&](const auto& known) { return known.first == name; })
+          ->second;
+    };
+    const auto in = [&](const auto& unit) { return longest_mm / factor(unit_) * unit.second; };
+    const auto best =
+        std::min_element(units_mm.begin(), units_mm.end(), [&](const auto& a, const auto& b) {
+          return std::abs(std::log(in(a) / hand_mm)) < std::abs(std::log(in(b) / hand_mm));
+        });
+    if (best->first == unit_ || fit_mm_ > 0) return "is that meant?";
+    return "are the file's numbers " + std::string(best->first) + "? --unit " +
+           std::string(best->first) + " makes its longest side " +
+           shortestText(std::round(in(*best) * 100) / 100) + " mm";
+  }
+
   /// The voxels within a voxel diagonal of the mesh's bounding box; where y is refined, the same
   /// region in finer voxels.
   Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm) const {
@@ -249,7 +295,7 @@ class MeshToSdf : public Source {
 
   /// Every leaf that the band meets, spread by the area of the surface over the rows that it
   /// crosses.
-  double leavesPerRow(const Mesh& mesh, const Lattice& lattice) const {
+  std::vector<double> leavesOfRows(const Mesh& mesh, const Lattice& lattice) const {
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
     const auto rows = static_cast<std::size_t>(lattice.layers().size() / leaf_layers + 2);
     const double low = lattice.layers().begin * lattice.pitch_mm.z();
@@ -273,7 +319,7 @@ class MeshToSdf : public Source {
       for (std::size_t row = first; row <= last; ++row)
         leaves[row] += touched / static_cast<double>(last - first + 1);
     }
-    return *std::max_element(leaves.begin(), leaves.end());
+    return leaves;
   }
 
   static Grids gridsOf(const DistanceGrids& made) {
@@ -294,6 +340,7 @@ class MeshToSdf : public Source {
   bool strict_ = false;
   int refine_y_ = 1;
   std::string band_text_ = "1";
+  Vec3d build_mm_{0, 0, 0};  ///< what the printer can print; zero where unknown
   DistanceExtras extras_;
 
   Band band_;

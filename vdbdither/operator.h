@@ -90,6 +90,12 @@ class Filter : public Operator {
   [[nodiscard]] virtual Grids run(const Slab& in) const = 0;
 };
 
+/// What a sink will put on a disk.
+struct OutputEstimate {
+  std::string path;  ///< empty: nothing, or not on a disk
+  double bytes = 0;  ///< about; 0 where unknown
+};
+
 /// Takes slabs in rising z. In the middle of a chain it sees the slabs and they pass on.
 class Sink : public Operator {
  public:
@@ -97,6 +103,8 @@ class Sink : public Operator {
   virtual void write(const Slab& in) = 0;
   /// Publishes. Before it returns, nothing exists under the name that the user gave.
   virtual void finish() = 0;
+  /// Asked after `plan`.
+  [[nodiscard]] virtual OutputEstimate output() const { return {}; }
   /// Whether the voxels leave by standard output. Asked once the options are read.
   [[nodiscard]] virtual bool writesToStandardOutput() const { return false; }
 };
@@ -106,7 +114,9 @@ class Sink : public Operator {
 struct OperatorInfo {
   std::string_view name;     ///< the verb, kebab-case
   std::string_view summary;  ///< one sentence, no full stop
-  std::string_view example;  ///< a whole chain that runs in a folder with a `part.stl`
+  /// A whole chain that runs in a folder with a `part.stl`, or several, a line each, of which the
+  /// last shows the verb.
+  std::string_view example;
   std::unique_ptr<Operator> (*make)();
   /// Moves grids without changing them (read, write): leaves no line in the history.
   bool transport = false;

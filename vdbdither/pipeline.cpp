@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <mutex>
 #include <sstream>
@@ -43,19 +44,10 @@ auto inStage(const std::string& name, const Function& function) {
   }
 }
 
-double bytesPerVoxel(const openvdb::GridBase& grid) {
-  const std::string type = grid.valueType();
-  if (type == "bool" || type == "mask") return 0.125;
-  const double component = type.ends_with("d") || type == "int64" || type == "double" ? 8 : 4;
-  return type.starts_with("vec3") ? 3 * component : component;
-}
-
 /// What the leaves of one row (eight layers) of all grids take.
 double bytesPerRow(const Schema& schema) {
-  constexpr double leaf_overhead_bytes = 128;
   double bytes = 0;
-  for (const auto& [name, grid] : schema.grids)
-    bytes += 512 * bytesPerVoxel(*grid) + leaf_overhead_bytes;
+  for (const auto& [name, grid] : schema.grids) bytes += leafBytes(grid);
   return bytes * schema.leaves_per_row;
 }
 
@@ -83,6 +75,15 @@ double availableMemoryBytes() {
     if (key == "MemAvailable:") return kilobytes * 1024;
   }
   return std::numeric_limits<double>::infinity();
+}
+
+/// What is left where `path` is to be; infinite where that cannot be told.
+double freeDiskBytes(const std::string& path) {
+  std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (folder.empty()) folder = ".";
+  std::error_code error;
+  const std::filesystem::space_info space = std::filesystem::space(folder, error);
+  return error ? std::numeric_limits<double>::infinity() : static_cast<double>(space.available);
 }
 
 }  // namespace
@@ -275,6 +276,7 @@ void Pipeline::plan(Watcher& watcher) {
   wanted_ = parseLayers(options_.layers, in->lattice.layers());
   planRanges();
   planSlabs();
+  checkDisk();
 }
 
 void Pipeline::planRanges() {
@@ -315,6 +317,27 @@ void Pipeline::planSlabs() {
                     bytesText(budget) +
                     "; take a smaller --slab, fewer --layers, or more --memory");
   }
+}
+
+void Pipeline::checkDisk() const {
+  if (options_.explain) return;
+  for (const auto& stage : stages_) {
+    if (!stage->sink()) continue;
+    const OutputEstimate output = expectedOutput(*stage);
+    const double free = freeDiskBytes(output.path);
+    if (output.bytes > free) {
+      throw DataError(stage->name() + ": '" + output.path + "' needs about " +
+                      bytesText(output.bytes) + ", and its disk has " + bytesText(free) +
+                      " left; name another place, or fewer --layers");
+    }
+  }
+}
+
+OutputEstimate Pipeline::expectedOutput(const Stage& stage) const {
+  OutputEstimate output = stage.sink()->output();
+  const int all = stage.out().lattice.layers().size();
+  if (all > 0) output.bytes *= static_cast<double>(wanted_.size()) / all;
+  return output;
 }
 
 double Pipeline::memoryBudgetBytes() const {
@@ -368,6 +391,14 @@ std::string Pipeline::explanation() const {
   }
   text << "memory    about " << bytesText(expectedMemoryBytes(slab_layers_)) << " of "
        << bytesText(memoryBudgetBytes()) << "\n";
+  for (const auto& stage : stages_) {
+    if (!stage->sink()) continue;
+    const OutputEstimate output = expectedOutput(*stage);
+    if (output.bytes > 0) {
+      text << "disk      about " << bytesText(output.bytes) << " of "
+           << bytesText(freeDiskBytes(output.path)) << " for " << output.path << "\n";
+    }
+  }
   return text.str();
 }
 

@@ -73,6 +73,8 @@ class Pipeline {
   void push(std::size_t index, Slab slab);
   [[nodiscard]] double expectedMemoryBytes(int slab_layers) const;
   [[nodiscard]] double memoryBudgetBytes() const;
+  [[nodiscard]] OutputEstimate expectedOutput(const Stage& stage) const;
+  void checkDisk() const;
 
   RunOptions options_;
   Options run_options_;

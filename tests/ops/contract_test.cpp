@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include <gtest/gtest.h>
 
@@ -57,8 +58,17 @@ class Contract : public testing::TestWithParam<const OperatorInfo*> {
     return folder;
   }
 
-  [[nodiscard]] static std::vector<Step> example() {
-    return parseChain(splitWords(std::string(GetParam()->example)));
+  /// The chains of the example; the last one shows the operator.
+  [[nodiscard]] static std::vector<std::vector<Step>> chains() {
+    std::vector<std::vector<Step>> chains;
+    std::istringstream text{std::string(GetParam()->example)};
+    for (std::string line; std::getline(text, line);)
+      chains.push_back(parseChain(splitWords(line)));
+    return chains;
+  }
+
+  static void runExample(const std::vector<std::string>& more = {}) {
+    for (const std::vector<Step>& chain : chains()) runChain(chain, more);
   }
 
   test::ScratchFolder scratch_;
@@ -66,12 +76,12 @@ class Contract : public testing::TestWithParam<const OperatorInfo*> {
 };
 
 TEST_P(Contract, ItsExampleNamesItAndRuns) {
-  const std::vector<Step> steps = example();
+  const std::vector<Step> steps = chains().back();
   EXPECT_TRUE(GetParam()->transport ||
               std::any_of(steps.begin(), steps.end(),
                           [](const Step& step) { return step.verb == GetParam()->name; }));
   const fs::path folder = enter("example");
-  runChain(steps);
+  runExample();
   EXPECT_GT(test::filesUnder(folder).size(), 1U);
 }
 
@@ -92,7 +102,7 @@ TEST_P(Contract, ItsWordsAreOfOneStyle) {
 
 TEST_P(Contract, SlabHeightAndThreadsChangeNoByte) {
   const fs::path reference = enter("reference");
-  runChain(example());
+  runExample();
   const auto expected = test::filesUnder(reference);
   for (const std::vector<std::string>& more :
        std::vector<std::vector<std::string>>{{"--slab", "8"},
@@ -100,18 +110,21 @@ TEST_P(Contract, SlabHeightAndThreadsChangeNoByte) {
                                              {"--slab", "all"},
                                              {"--threads", "1"}}) {
     const fs::path folder = enter(more[0] + more[1]);
-    runChain(example(), more);
+    runExample(more);
     EXPECT_TRUE(test::filesUnder(folder) == expected) << more[0] << " " << more[1];
   }
 }
 
 TEST_P(Contract, ItKeepsWhatAFilterPromises) {
-  const std::vector<Step> steps = example();
+  std::vector<std::vector<Step>> before = chains();
+  const std::vector<Step> steps = before.back();
+  before.pop_back();
   const auto step = std::find_if(steps.begin(), steps.end(),
                                  [](const Step& s) { return s.verb == GetParam()->name; });
   const std::unique_ptr<Operator> made = GetParam()->make();
   auto* filter = dynamic_cast<Filter*>(made.get());
   if (!filter) GTEST_SKIP() << "no filter";
+  for (const std::vector<Step>& chain : before) runChain(chain);
   std::vector<Step> upstream(steps.begin(), step);
   upstream.push_back({"write", {"upstream.vdb"}});
   runChain(upstream);
