@@ -62,8 +62,10 @@ class ProfileParser {
   openvdb::Vec3d lengths(const ordered_json& json, const std::string& key, double min_mm,
                          double max_mm) {
     openvdb::Vec3d result(0.0);
-    const std::string problem = key + " must be three lengths between " + shortestText(min_mm) +
-                                " and " + shortestText(max_mm) + " mm";
+    std::ostringstream problem_text;
+    problem_text << key << " must be three lengths between " << min_mm << " and " << max_mm
+                 << " mm";
+    const std::string problem = problem_text.str();
     if (!json.contains(key) || !json[key].is_array() || json[key].size() != 3) {
       problems_.push_back(problem);
       return result;

@@ -159,6 +159,7 @@ RunImage decodeTiff(std::span<const std::uint8_t> bytes) {
       runs.pixel(x, depth == 8 ? row[x] : (row[x / 8] >> (7 - x % 8) & 1U) ^ flip);
     runs.endRow();
   }
+  if (!memory.error.empty()) throw refuse();
   return runs.finish();
 }
 

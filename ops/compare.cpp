@@ -30,12 +30,12 @@ class Compare : public Sink {
   }
 
   [[nodiscard]] std::string inputFile() const override {
+    if (paths_.size() > 2)
+      throw UsageError("file: two can be compared, not " + std::to_string(paths_.size()));
     return paths_.size() > 1 ? paths_.front() : "";
   }
 
   void plan(const Schema& in) override {
-    if (paths_.size() > 2)
-      throw UsageError("file: two can be compared, not " + std::to_string(paths_.size()));
     schema_ = in;
     other_ = std::make_unique<SlabReader>(paths_.back(), std::vector<std::string>());
     std::vector<std::string> names;

@@ -248,23 +248,26 @@ class MeshToSdf : public Source {
     }
   }
 
-  /// The unit that brings the part nearest to the size of a hand.
+  /// Of the other units the one that brings the part nearest to the size of a hand.
   [[nodiscard]] std::string likelierUnit(double longest_mm) const {
     constexpr double hand_mm = 100;
-    const auto factor = [](const std::string& name) {
-      return std::find_if(units_mm.begin(), units_mm.end(),
-                          [&](const auto& known) { return known.first == name; })
-          ->second;
-    };
-    const auto in = [&](const auto& unit) { return longest_mm / factor(unit_) * unit.second; };
-    const auto best =
-        std::min_element(units_mm.begin(), units_mm.end(), [&](const auto& a, const auto& b) {
-          return std::abs(std::log(in(a) / hand_mm)) < std::abs(std::log(in(b) / hand_mm));
-        });
-    if (best->first == unit_ || fit_mm_ > 0) return "is that meant?";
-    return "are the file's numbers " + std::string(best->first) + "? --unit " +
-           std::string(best->first) + " makes its longest side " +
-           shortestText(std::round(in(*best) * 100) / 100) + " mm";
+    const auto present = std::find_if(units_mm.begin(), units_mm.end(),
+                                      [this](const auto& unit) { return unit.first == unit_; });
+    std::string_view likelier;
+    double best_mm = 0;
+    for (const auto& [name, factor] : units_mm) {
+      const double mm = longest_mm / present->second * factor;
+      const bool nearer =
+          best_mm == 0 || std::abs(std::log(mm / hand_mm)) < std::abs(std::log(best_mm / hand_mm));
+      if ((mm < longest_mm) == (longest_mm > hand_mm) && mm != longest_mm && nearer) {
+        likelier = name;
+        best_mm = mm;
+      }
+    }
+    if (likelier.empty() || fit_mm_ > 0) return "is that meant?";
+    const std::string unit(likelier);
+    return "are the file's numbers " + unit + "? --unit " + unit + " makes its longest side " +
+           shortestText(std::round(best_mm * 100) / 100) + " mm";
   }
 
   /// The voxels within a voxel diagonal of the mesh's bounding box; where y is refined, the same

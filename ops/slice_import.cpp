@@ -235,14 +235,19 @@ class SliceImport : public Source {
     }
   }
 
+  /// Layers are asked for in whole leaves, so of a stack that does not end at one some are left.
   void checkCovered(ZRange core) const {
     if (intersection(core, layers_) == core || core.empty()) return;
-    const int bottom = frame_.box.min().z();
-    throw DataError(
-        "'" + path_ + "' lacks layer " +
-        std::to_string((core.begin < layers_.begin ? core.begin : layers_.end) - bottom) +
-        "; --layers " + std::to_string(layers_.begin - bottom) + ":" +
-        std::to_string(layers_.end - bottom) + " takes those it has");
+    const ZRange all{frame_.box.min().z(), frame_.box.max().z() + 1};
+    ZRange whole = layers_;
+    if (whole.begin > all.begin) whole.begin = alignedToLeaves({whole.begin - 1, whole.begin}).end;
+    if (whole.end < all.end) whole.end = alignedToLeaves({whole.end, whole.end + 1}).begin;
+    const int missing = core.begin < layers_.begin ? core.begin : layers_.end;
+    throw DataError("'" + path_ + "' lacks layer " + std::to_string(missing - all.begin) +
+                    (whole.empty() ? make_again
+                                   : "; --layers " + std::to_string(whole.begin - all.begin) + ":" +
+                                         std::to_string(whole.end - all.begin) +
+                                         " takes what it has in whole groups of eight"));
   }
 
   [[nodiscard]] RunImage readLayer(int z) const {

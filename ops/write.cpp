@@ -48,7 +48,7 @@ class WriteOperator : public Sink {
     constexpr double share = 0.2;
     double bytes = 0;
     for (const auto& [name, grid] : schema_.grids)
-      bytes += share * schema_.leaves * leafBytes(grid) * (half_ ? 0.5 : 1);
+      bytes += share * schema_.leaves * leafBytes(grid) * (half_ ? 0.7 : 1);
     return {path_, bytes};
   }
   [[nodiscard]] bool writesToStandardOutput() const override { return isPipe(); }

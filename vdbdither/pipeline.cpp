@@ -180,7 +180,9 @@ class Pipeline::Stage : public Reporter {
   [[nodiscard]] const std::vector<Read>& reads() const { return reads_; }
   [[nodiscard]] bool isBarrier() const { return operator_->isBarrier() || widest(reads_).whole; }
   [[nodiscard]] double memoryBytes() const { return operator_->memoryBytes(); }
-  [[nodiscard]] std::string inputFile() const { return operator_->inputFile(); }
+  [[nodiscard]] std::string inputFile() const {
+    return inStage(name(), [&] { return operator_->inputFile(); });
+  }
   [[nodiscard]] Source* source() const { return dynamic_cast<Source*>(operator_.get()); }
   [[nodiscard]] Filter* filter() const { return dynamic_cast<Filter*>(operator_.get()); }
   [[nodiscard]] Sink* sink() const { return dynamic_cast<Sink*>(operator_.get()); }

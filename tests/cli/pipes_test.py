@@ -166,7 +166,8 @@ class Stops(ProgramTest):
         # Nobody estimates what a file that is read becomes, so the run begins.
         self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "-o", "part.vdb")
         self.refuse(1, "'disk/a.vdb': No space left on device", "read", "part.vdb", "!", "write", "disk/a.vdb")
-        self.refuse(1, "No space left on device", "slice-export", "-i", "part.vdb", "disk/out")
+        self.refuse(1, "No space left on device", "slice-export", "-i", "part.vdb", "disk/out", "--layers", "0:20",
+                    "--format", "exr", "--exr-packing", "none")
         self.refuse(1, "'disk/out.zip': No space left on device", "slice-export", "-i", "part.vdb", "disk/out.zip",
                     "--format", "exr", "--exr-packing", "none")
 

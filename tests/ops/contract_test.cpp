@@ -21,18 +21,24 @@ namespace {
 using test::firstBreach;
 namespace fs = std::filesystem;
 
-class Silent : public Watcher {
+/// Keeps what operators are there to tell.
+class Listener : public Watcher {
  public:
   void warn(const std::string&, const std::string&) override {}
   void progress(const std::string&, int, int, double) override {}
+  void print(const std::string& text) override { printed += text; }
+
+  std::string printed;
 };
 
-void runChain(std::vector<Step> steps, const std::vector<std::string>& more = {}) {
+/// Returns what the chain told.
+std::string runChain(std::vector<Step> steps, const std::vector<std::string>& more = {}) {
   for (const std::string& argument : more) steps.back().arguments.push_back(argument);
-  Silent silent;
+  Listener listener;
   Pipeline pipeline(steps);
-  pipeline.plan(silent);
+  pipeline.plan(listener);
   pipeline.run();
+  return listener.printed;
 }
 
 /// Every registered operator by its example, in a folder with a part.
@@ -67,8 +73,11 @@ class Contract : public testing::TestWithParam<const OperatorInfo*> {
     return chains;
   }
 
-  static void runExample(const std::vector<std::string>& more = {}) {
-    for (const std::vector<Step>& chain : chains()) runChain(chain, more);
+  /// Returns what it told.
+  static std::string runExample(const std::vector<std::string>& more = {}) {
+    std::string printed;
+    for (const std::vector<Step>& chain : chains()) printed += runChain(chain, more);
+    return printed;
   }
 
   test::ScratchFolder scratch_;
@@ -102,7 +111,7 @@ TEST_P(Contract, ItsWordsAreOfOneStyle) {
 
 TEST_P(Contract, SlabHeightAndThreadsChangeNoByte) {
   const fs::path reference = enter("reference");
-  runExample();
+  const std::string printed = runExample();
   const auto expected = test::filesUnder(reference);
   for (const std::vector<std::string>& more :
        std::vector<std::vector<std::string>>{{"--slab", "8"},
@@ -110,7 +119,7 @@ TEST_P(Contract, SlabHeightAndThreadsChangeNoByte) {
                                              {"--slab", "all"},
                                              {"--threads", "1"}}) {
     const fs::path folder = enter(more[0] + more[1]);
-    runExample(more);
+    EXPECT_EQ(runExample(more), printed) << more[0] << " " << more[1];
     EXPECT_TRUE(test::filesUnder(folder) == expected) << more[0] << " " << more[1];
   }
 }
