@@ -55,6 +55,12 @@ class Compare : public Sink {
 
   [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
 
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    std::vector<std::string> names;
+    for (const auto& [name, finding] : findings_) names.push_back(name);
+    return names;
+  }
+
   void write(const Slab& in) override {
     const ZRange others = other_->schema().lattice.layers();
     // The boxes may differ where the voxels do not: what only the other has must be empty.

@@ -118,6 +118,12 @@ class SliceExport : public Sink {
     return {folder_, schema_.leaves * per_leaf + schema_.lattice.layers().size() * per_slice};
   }
 
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    std::vector<std::string> names{source_};
+    if (format_ == "exr") names.insert(names.end(), {"surface", "N"});
+    return names;
+  }
+
   void write(const Slab& in) override {
     if (!stack_) stack_.emplace(folder_);
     const int together =

@@ -119,6 +119,12 @@ class Stats : public Sink {
     }
   }
 
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    std::vector<std::string> names = measured_;
+    if (histogram_) names.push_back(histogram_grid_);
+    return names;
+  }
+
   void write(const Slab& in) override {
     const SliceFrame frame{lattice_.box, 0, false, false};
     // Few layers at a time, as their runs are not small.

@@ -69,6 +69,7 @@ class Pipeline {
 
   void addStage(const Step& step);
   void planRanges();
+  void planNeeds();
   void planSlabs();
   void push(std::size_t index, Slab slab);
   [[nodiscard]] double expectedMemoryBytes(int slab_layers) const;
