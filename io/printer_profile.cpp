@@ -35,6 +35,8 @@ PrinterProfile parse(const std::string& text) {
   profile.source = json.value("source", "");
   profile.pitch_mm = lengths(json.at("pitch_mm"));
   if (json.contains("build_mm")) profile.build_mm = lengths(json.at("build_mm"));
+  if (json.contains("point_spread_mm"))
+    profile.point_spread_mm = lengths(json.at("point_spread_mm"));
   for (const ordered_json& entry : json.value("materials", ordered_json::array())) {
     Material material;
     material.name = entry.at("name");
@@ -45,6 +47,9 @@ PrinterProfile parse(const std::string& text) {
   for (int axis = 0; axis < 3; ++axis) {
     if (!(profile.pitch_mm[axis] >= 1e-4 && profile.pitch_mm[axis] <= 100)) {
       throw UsageError("pitch_mm must be three lengths between 0.0001 and 100 mm");
+    }
+    if (!(profile.point_spread_mm[axis] >= 0 && profile.point_spread_mm[axis] <= 10)) {
+      throw UsageError("point_spread_mm must be three lengths up to 10 mm");
     }
   }
   return profile;
@@ -81,6 +86,10 @@ std::string toJson(const PrinterProfile& profile) {
   json["source"] = profile.source;
   json["pitch_mm"] = {profile.pitch_mm[0], profile.pitch_mm[1], profile.pitch_mm[2]};
   json["build_mm"] = {profile.build_mm[0], profile.build_mm[1], profile.build_mm[2]};
+  if (!profile.point_spread_mm.isZero()) {
+    json["point_spread_mm"] = {profile.point_spread_mm[0], profile.point_spread_mm[1],
+                               profile.point_spread_mm[2]};
+  }
   json["materials"] = ordered_json::array();
   for (const Material& material : profile.materials) {
     json["materials"].push_back({{"name", material.name}, {"rgba", material.rgba}});

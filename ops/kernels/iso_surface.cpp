@@ -106,13 +106,13 @@ IsoSurface::IsoSurface(const Lattice& lattice, Inside inside, float level, float
       between_(between) {}
 
 SurfacePiece IsoSurface::add(const openvdb::BoolGrid::ConstPtr& voxels, ZRange layers) {
-  return addBits(bitLayers(*voxels, frame_, layers), layers);
+  return addBits(insideOf(*voxels, layers), layers);
 }
 
 SurfacePiece IsoSurface::add(const openvdb::FloatGrid::ConstPtr& field, ZRange layers) {
   below_ = std::move(here_);
   here_ = field;
-  return addBits(bitLayers(*field, frame_, layers, inside_, level_), layers);
+  return addBits(insideOf(*field, layers), layers);
 }
 
 SurfacePiece IsoSurface::finish() {

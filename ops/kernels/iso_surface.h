@@ -53,6 +53,17 @@ class IsoSurface {
   /// Closes the surface above the last layer.
   SurfacePiece finish();
 
+  /// Which voxels of the layers are inside.
+  [[nodiscard]] std::vector<BitLayer> insideOf(const openvdb::BoolGrid& voxels,
+                                               ZRange layers) const {
+    return bitLayers(voxels, frame_, layers);
+  }
+  [[nodiscard]] std::vector<BitLayer> insideOf(const openvdb::FloatGrid& field,
+                                               ZRange layers) const {
+    return bitLayers(field, frame_, layers, inside_, level_);
+  }
+  [[nodiscard]] const BitFrame& frame() const { return frame_; }
+
  private:
   /// The lines of one kind that the surface cuts, and which vertices they have: `first` of a word
   /// is that of its lowest bit.
