@@ -41,6 +41,7 @@ class WriteOperator : public Sink {
   }
 
   [[nodiscard]] bool isBarrier() const override { return !isPipe(); }
+  [[nodiscard]] bool writesToStandardOutput() const override { return isPipe(); }
 
   void write(const Slab& in) override {
     if (frames_) {

@@ -6,8 +6,8 @@
 
 #include <openvdb/tools/Prune.h>
 
-#include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
+#include "vdbdither/visit_grid.h"
 
 namespace vdbdither {
 
@@ -16,10 +16,6 @@ using openvdb::CoordBBox;
 using openvdb::GridBase;
 
 namespace {
-
-using CarriedGrids = openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid,
-                                       openvdb::Int64Grid, openvdb::Vec3SGrid, openvdb::Vec3DGrid,
-                                       openvdb::BoolGrid, openvdb::MaskGrid>;
 
 ZRange layersOf(const CoordBBox& box) { return {box.min().z(), box.max().z() + 1}; }
 
@@ -118,21 +114,12 @@ class LayerCopy {
   ZRange range_;
 };
 
-/// Calls `function` with the grid as what it is.
-template <typename Function>
-void visit(const GridBase& grid, const Function& function) {
-  if (!grid.apply<CarriedGrids>(function)) {
-    throw DataError("grid '" + grid.getName() + "' is of type " + grid.type() +
-                    ", which slabs cannot carry");
-  }
-}
-
 }  // namespace
 
 GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted) {
   if (pieces.size() == 1 && within(pieces.front().range, wanted)) return pieces.front().grid;
   GridConstPtr result;
-  visit(*pieces.front().grid, [&](const auto& first) {
+  visitGrid(*pieces.front().grid, [&](const auto& first) {
     using GridT = std::decay_t<decltype(first)>;
     const auto joined = openvdb::gridPtrCast<GridT>(first.copyGridWithNewTree());
     for (const Layers& piece : pieces) {
@@ -148,7 +135,7 @@ GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted) {
 
 GridConstPtr pruned(const GridConstPtr& grid) {
   const GridBase::Ptr copy = grid->deepCopyGrid();
-  visit(*copy, [&](const auto& typed) {
+  visitGrid(*copy, [&](const auto& typed) {
     using GridT = std::decay_t<decltype(typed)>;
     openvdb::tools::prune(openvdb::gridPtrCast<GridT>(copy)->tree());
   });

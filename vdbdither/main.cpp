@@ -98,11 +98,29 @@ void printStages(const Pipeline& pipeline, double seconds) {
                pipeline.boxVoxels() / seconds / 1e6);
 }
 
+/// The console of the program: what operators tell goes to standard output, or to standard error
+/// where that carries voxels.
+class ProgramConsole : public Console {
+ public:
+  explicit ProgramConsole(bool voxels_on_output) : voxels_on_output_(voxels_on_output) {}
+  void print(const std::string& text) override {
+    clear();
+    if (voxels_on_output_) {
+      std::fputs(text.c_str(), stderr);
+    } else {
+      printData(text.c_str());
+    }
+  }
+
+ private:
+  bool voxels_on_output_;
+};
+
 void runChain(const std::vector<std::string>& words) {
   Pipeline pipeline(parseChain(words));
   const RunOptions& options = pipeline.options();
   if (const OperatorInfo* info = pipeline.helpWanted()) return printData(helpOf(*info).c_str());
-  Console console;
+  ProgramConsole console(pipeline.writesToStandardOutput());
   console.begin(options.quiet, 0);
   const auto start = std::chrono::steady_clock::now();
   pipeline.plan(console);
@@ -118,14 +136,7 @@ void runChain(const std::vector<std::string>& words) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (options.verbose) printStages(pipeline, seconds);
-  if (!options.json) return;
-  const std::string report = reportJson(pipeline, seconds);
-  // Where standard output carries voxels, the words go to standard error.
-  if (pipeline.writesToStandardOutput()) {
-    std::fputs(report.c_str(), stderr);
-  } else {
-    printData(report.c_str());
-  }
+  if (options.json) console.print(reportJson(pipeline, seconds));
 }
 
 void runProgram(int argc, char** argv) {

@@ -38,6 +38,9 @@ class Reporter {
   virtual void count(const std::string& name, double value) = 0;
   /// How far a long computation inside one call is, 0 … 1. Throws when the user wants to stop.
   virtual void progress(double fraction) = 0;
+  /// What the operator is there to tell, in whole lines: to standard output, or to standard error
+  /// where voxels leave by standard output.
+  virtual void print(const std::string& /*text*/) {}
 };
 
 /// One verb. `declare` binds the options; `plan` makes every check that can be made before the
@@ -52,6 +55,10 @@ class Operator {
   /// Whether it holds the whole volume at once, which --explain announces and --stream refuses.
   /// Asked after `plan`.
   [[nodiscard]] virtual bool isBarrier() const { return false; }
+
+  /// The .vdb that it names itself, to be read where it begins a chain in place of --input. Asked
+  /// once the options are read.
+  [[nodiscard]] virtual std::string inputFile() const { return ""; }
 
   void setReporter(Reporter* reporter) { reporter_ = reporter; }
 
@@ -90,6 +97,8 @@ class Sink : public Operator {
   virtual void write(const Slab& in) = 0;
   /// Publishes. Before it returns, nothing exists under the name that the user gave.
   virtual void finish() = 0;
+  /// Whether the voxels leave by standard output. Asked once the options are read.
+  [[nodiscard]] virtual bool writesToStandardOutput() const { return false; }
 };
 
 /// What the registry holds of an operator: `extern const OperatorInfo material_assign` in

@@ -134,6 +134,8 @@ class Pipeline::Stage : public Reporter {
     report_.counts.emplace_back(what, value);
   }
 
+  void print(const std::string& text) override { watcher->print(text); }
+
   void progress(double fraction) override {
     throwIfInterrupted();
     watcher->progress(name(), done_layers, total_layers, fraction);
@@ -177,6 +179,7 @@ class Pipeline::Stage : public Reporter {
   [[nodiscard]] const std::vector<Read>& reads() const { return reads_; }
   [[nodiscard]] bool isBarrier() const { return operator_->isBarrier() || widest(reads_).whole; }
   [[nodiscard]] double memoryBytes() const { return operator_->memoryBytes(); }
+  [[nodiscard]] std::string inputFile() const { return operator_->inputFile(); }
   [[nodiscard]] Source* source() const { return dynamic_cast<Source*>(operator_.get()); }
   [[nodiscard]] Filter* filter() const { return dynamic_cast<Filter*>(operator_.get()); }
   [[nodiscard]] Sink* sink() const { return dynamic_cast<Sink*>(operator_.get()); }
@@ -205,7 +208,15 @@ Pipeline::Pipeline(const std::vector<Step>& steps) {
   }
   if (!stages_.front()->source()) {
     std::vector<std::string> arguments;
-    if (!options_.input.empty()) arguments = {options_.input};
+    const std::string own = stages_.front()->inputFile();
+    if (!own.empty() && !options_.input.empty()) {
+      throw UsageError("--input: " + stages_.front()->name() + " reads '" + own + "'");
+    }
+    if (!own.empty()) {
+      arguments = {own};
+    } else if (!options_.input.empty()) {
+      arguments = {options_.input};
+    }
     stages_.insert(stages_.begin(), std::make_unique<Stage>(findOperator(source_verb)));
     stages_.front()->parse(arguments, run_options_);
   } else if (!options_.input.empty()) {
@@ -216,7 +227,6 @@ Pipeline::Pipeline(const std::vector<Step>& steps) {
     std::vector<std::string> arguments{options_.output.empty() ? "-" : options_.output};
     if (options_.overwrite) arguments.emplace_back("--overwrite");
     addStage({sink_verb, arguments});
-    standard_output_ = options_.output.empty();
   } else if (!options_.output.empty()) {
     throw UsageError("--output: the chain ends with " + stages_.back()->name() +
                      ", which names its own output");
@@ -238,6 +248,10 @@ void Pipeline::addStage(const Step& step) {
     throw UsageError(stage->name() + ": makes slabs of its own and can only begin a chain");
   }
   stage->parse(step.arguments, run_options_);
+  if (const std::string file = stage->inputFile(); !file.empty() && !stages_.empty()) {
+    throw UsageError(stage->name() + ": takes what comes to it and cannot read '" + file +
+                     "' as well");
+  }
   stages_.push_back(std::move(stage));
 }
 
@@ -404,6 +418,12 @@ void Pipeline::push(std::size_t index, Slab slab) {
     task = {};
     push(index + 1, {core, core, std::move(made)});
   }
+}
+
+bool Pipeline::writesToStandardOutput() const {
+  return std::any_of(stages_.begin(), stages_.end(), [](const auto& stage) {
+    return stage->sink() && stage->sink()->writesToStandardOutput();
+  });
 }
 
 std::vector<StageReport> Pipeline::reports() const {

@@ -20,6 +20,8 @@ class Watcher {
   /// `done` of `total` layers have reached the end; `fraction` is how far a long step within one
   /// slab is.
   virtual void progress(const std::string& stage, int done, int total, double fraction) = 0;
+  /// What an operator is there to tell, in whole lines.
+  virtual void print(const std::string& /*text*/) {}
 };
 
 /// What a stage did, for --json and --verbose.
@@ -58,7 +60,7 @@ class Pipeline {
 
   [[nodiscard]] std::vector<StageReport> reports() const;
   /// Whether the voxels leave by standard output.
-  [[nodiscard]] bool writesToStandardOutput() const { return standard_output_; }
+  [[nodiscard]] bool writesToStandardOutput() const;
   [[nodiscard]] int layers() const { return wanted_.size(); }
   [[nodiscard]] double boxVoxels() const;
 
@@ -79,7 +81,6 @@ class Pipeline {
   Watcher* watcher_ = nullptr;
   ZRange wanted_;  ///< the layers that the end of the chain is to have
   int slab_layers_ = 0;
-  bool standard_output_ = false;
 };
 
 /// The largest resident size the process has had.

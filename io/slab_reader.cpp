@@ -1,0 +1,131 @@
+#include "io/slab_reader.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <limits>
+#include <sstream>
+#include <unistd.h>
+
+#include "io/vdb.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/layers.h"
+#include "vdbdither/openvdb.h"
+
+namespace vdbdither {
+
+namespace {
+
+/// Only the grids of `grids` that `names` asks for.
+void keepNamed(Grids& grids, const std::vector<std::string>& names) {
+  if (names.empty()) return;
+  Grids kept;
+  for (const std::string& name : names) {
+    const auto found = grids.find(name);
+    if (found == grids.end()) {
+      std::string message = "--grids: no grid '" + name + "'; there are";
+      for (const auto& [known, grid] : grids) message += " " + known;
+      throw UsageError(message);
+    }
+    kept.insert(*found);
+  }
+  grids = std::move(kept);
+}
+
+}  // namespace
+
+SlabReader::SlabReader(std::string path, const std::vector<std::string>& names)
+    : path_(std::move(path)) {
+  std::error_code none;
+  const std::filesystem::file_type type = std::filesystem::status(path_, none).type();
+  if (path_ == "-") {
+    shown_ = "standard input";
+    openPipe(STDIN_FILENO);
+  } else if (type == std::filesystem::file_type::fifo) {
+    shown_ = "'" + path_ + "'";
+    descriptor_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor_ < 0) throw DataError("cannot read " + shown_ + ": " + std::strerror(errno));
+    openPipe(descriptor_);
+  } else {
+    shown_ = "'" + path_ + "'";
+    openFile(names);
+  }
+  keepNamed(schema_.grids, names);
+}
+
+SlabReader::~SlabReader() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void SlabReader::openPipe(int descriptor) {
+  frames_ = std::make_unique<FrameReader>(descriptor, shown_);
+  schema_ = frames_->schema();
+}
+
+void SlabReader::openFile(const std::vector<std::string>& names) {
+  VdbContents contents = readVdb(path_);
+  // What is not wanted may lie on any lattice.
+  keepNamed(contents.grids, names);
+  schema_ = schemaOf(contents, shown_);
+  // Where the file does not say, every layer counts: its box may be smaller than what it holds.
+  ZRange held{std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};
+  if (const auto some = schema_.metadata.extract(layers_key)) {
+    std::istringstream(some.mapped()) >> held.begin >> held.end;
+  }
+  slabs_.push_back({held, held, std::move(contents.grids)});
+}
+
+double SlabReader::memoryBytes() const {
+  double bytes = 0;
+  for (const Slab& slab : slabs_) {
+    for (const auto& [name, grid] : slab.grids) bytes += sizeOf(grid).bytes;
+  }
+  return bytes;
+}
+
+Grids SlabReader::run(ZRange core) {
+  const std::lock_guard lock(mutex_);
+  if (isPipe()) takeFrames(core);
+  checkCovered(core);
+  Grids result;
+  for (const auto& [name, prototype] : schema_.grids) {
+    std::vector<Layers> pieces;
+    for (const Slab& slab : slabs_) {
+      const auto found = slab.grids.find(name);
+      if (found != slab.grids.end()) pieces.push_back({found->second, slab.core});
+    }
+    if (!pieces.empty()) result[name] = joinLayers(pieces, core);
+  }
+  return result;
+}
+
+/// Frames come in rising z and so do the cores asked of a pipe: what lies below is dropped, what is
+/// missing is fetched.
+void SlabReader::takeFrames(ZRange core) {
+  std::erase_if(slabs_, [&](const Slab& slab) { return slab.core.end <= core.begin; });
+  while (!ended_ && (slabs_.empty() || slabs_.back().core.end < core.end)) {
+    std::optional<Slab> slab = frames_->next();
+    ended_ = !slab;
+    if (slab && slab->core.end > core.begin) slabs_.push_back(std::move(*slab));
+  }
+  // The closing frame must be seen before anything downstream is published.
+  if (core.end >= frames_->schema().lattice.layers().end && !ended_) ended_ = !frames_->next();
+}
+
+/// What was made with --layers lacks the others, which are not empty.
+void SlabReader::checkCovered(ZRange core) const {
+  int covered = core.begin;
+  for (const Slab& slab : slabs_) {
+    if (slab.core.begin <= covered) covered = std::max(covered, slab.core.end);
+  }
+  if (covered < core.end) {
+    throw DataError(shown_ + " lacks layer " +
+                    std::to_string(covered - schema_.lattice.layers().begin) +
+                    "; where only some layers are wanted, give --layers to the last operator of "
+                    "the chain alone");
+  }
+}
+
+}  // namespace vdbdither

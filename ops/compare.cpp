@@ -1,0 +1,173 @@
+#include <array>
+#include <cstdio>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
+#include "io/slab_reader.h"
+#include "ops/kernels/grid_difference.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+using nlohmann::ordered_json;
+using openvdb::GridBase;
+
+/// Holds what comes against a second archive, slab by slab.
+class Compare : public Sink {
+ public:
+  void declare(Options& options) override {
+    options.positionals("file", paths_,
+                        "Two .vdb files, or one that what comes is compared with; named pipes do");
+    options.number("tolerance", tolerance_, 0, std::numeric_limits<double>::infinity(),
+                   "Values this close count as equal");
+    options.text("grids", names_, "NAME,NAME", "Only these grids");
+    options.flag("json", json_, "Say it as JSON");
+  }
+
+  [[nodiscard]] std::string inputFile() const override {
+    return paths_.size() > 1 ? paths_.front() : "";
+  }
+
+  void plan(const Schema& in) override {
+    if (paths_.size() > 2)
+      throw UsageError("file: two can be compared, not " + std::to_string(paths_.size()));
+    schema_ = in;
+    other_ = std::make_unique<SlabReader>(paths_.back(), std::vector<std::string>());
+    std::vector<std::string> names;
+    if (names_.empty()) {
+      for (const Grids* grids : {&in.grids, &other_->schema().grids}) {
+        for (const auto& [name, grid] : *grids) names.push_back(name);
+      }
+    } else {
+      std::istringstream text(names_);
+      for (std::string name; std::getline(text, name, ',');) names.push_back(name);
+    }
+    for (const std::string& name : names) {
+      Finding& finding = findings_[name];
+      finding.apart = whatDiffers(in.grids, other_->schema().grids, name);
+    }
+  }
+
+  [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
+
+  void write(const Slab& in) override {
+    const ZRange others = other_->schema().lattice.layers();
+    // The boxes may differ where the voxels do not: what only the other has must be empty.
+    if (in.core.begin == schema_.lattice.layers().begin)
+      compare({}, {others.begin, std::min(in.core.begin, others.end)});
+    compare(in.grids, in.core);
+    end_ = in.core.end;
+  }
+
+  void finish() override {
+    if (end_ == schema_.lattice.layers().end) {
+      const ZRange others = other_->schema().lattice.layers();
+      compare({}, {std::max(end_, others.begin), others.end});
+    }
+    std::string summary;
+    for (const auto& [name, finding] : findings_) {
+      if (!finding.equal()) summary += (summary.empty() ? "" : "; ") + finding.text(name);
+    }
+    report().print(json_ ? jsonText() : summary.empty() ? "equal\n" : "");
+    if (!summary.empty()) throw DataError("not equal to '" + paths_.back() + "': " + summary);
+  }
+
+ private:
+  /// How a grid fares.
+  struct Finding {
+    std::string apart;  ///< in words, where voxels cannot be compared
+    GridDifference difference;
+
+    [[nodiscard]] bool equal() const { return apart.empty() && difference.voxels == 0; }
+    [[nodiscard]] std::string text(const std::string& name) const {
+      if (!apart.empty()) return "grid '" + name + "' " + apart;
+      std::array<char, 32> largest{};
+      std::snprintf(largest.data(), largest.size(), "%.6g", difference.largest);
+      const openvdb::Coord& at = difference.first;
+      return "grid '" + name + "' in " + std::to_string(difference.voxels) + " voxels, first at " +
+             std::to_string(at.x()) + " " + std::to_string(at.y()) + " " + std::to_string(at.z()) +
+             ", by at most " + largest.data();
+    }
+  };
+
+  static std::string whatDiffers(const Grids& ours, const Grids& others, const std::string& name) {
+    const auto a = ours.find(name);
+    const auto b = others.find(name);
+    if (a == ours.end() && b == others.end()) throw UsageError("no grid '" + name + "' in either");
+    if (b == others.end()) return "is missing there";
+    if (a == ours.end()) return "is there alone";
+    const GridBase& first = *a->second;
+    const GridBase& second = *b->second;
+    if (first.type() != second.type())
+      return "is of " + first.valueType() + ", there of " + second.valueType();
+    if (first.transform() != second.transform()) return "lies on another lattice";
+    if (first.getGridClass() != second.getGridClass()) {
+      return "is of class " + GridBase::gridClassToString(first.getGridClass()) + ", there of " +
+             GridBase::gridClassToString(second.getGridClass());
+    }
+    return "";
+  }
+
+  void compare(const Grids& ours, ZRange layers) {
+    if (layers.empty()) return;
+    const ZRange others = other_->schema().lattice.layers();
+    const ZRange asked = other_->isPipe() ? intersection(layers, others) : layers;
+    const Grids theirs = asked.empty() ? Grids() : other_->run(asked);
+    for (auto& [name, finding] : findings_) {
+      if (!finding.apart.empty()) continue;
+      const auto grid = [&](const Grids& grids, const Schema& schema) {
+        const auto found = grids.find(name);
+        return found == grids.end() ? schema.grids.at(name) : found->second;
+      };
+      finding.difference.add(
+          gridDifference(*grid(ours, schema_), *grid(theirs, other_->schema()), tolerance_));
+    }
+  }
+
+  [[nodiscard]] std::string jsonText() const {
+    ordered_json json;
+    bool equal = true;
+    for (const auto& [name, finding] : findings_) equal &= finding.equal();
+    json["equal"] = equal;
+    json["grids"] = ordered_json::array();
+    for (const auto& [name, finding] : findings_) {
+      ordered_json entry = {{"name", name}, {"equal", finding.equal()}};
+      if (!finding.apart.empty()) {
+        entry["difference"] = finding.apart;
+      } else {
+        entry["voxels"] = finding.difference.voxels;
+        if (finding.difference.voxels > 0) {
+          const openvdb::Coord& at = finding.difference.first;
+          entry["first"] = {at.x(), at.y(), at.z()};
+          entry["largest"] = finding.difference.largest;
+        }
+      }
+      json["grids"].push_back(std::move(entry));
+    }
+    return json.dump() + "\n";
+  }
+
+  std::vector<std::string> paths_;
+  double tolerance_ = 0;
+  std::string names_;
+  bool json_ = false;
+  Schema schema_;
+  std::unique_ptr<SlabReader> other_;
+  std::map<std::string, Finding> findings_;
+  int end_ = 0;
+};
+
+}  // namespace
+
+extern const OperatorInfo compare;
+const OperatorInfo compare{
+    "compare", "Whether two .vdb hold the same voxels, and where not; exits with 1 where not",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! compare surface.vdb",
+    [] { return std::unique_ptr<Operator>(std::make_unique<Compare>()); }};
+
+}  // namespace vdbdither
