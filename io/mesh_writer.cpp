@@ -150,6 +150,21 @@ class MeshWriter::Format {
   Output file_;
 };
 
+/// All vertices stand before all faces, which wait in a file that has lost its name.
+class MeshWriter::Indexed : public Format {
+ public:
+  explicit Indexed(const fs::path& path)
+      : Format(path), faces_(facesPath(), path, O_CREAT | O_TRUNC) {
+    fs::remove(facesPath());
+  }
+
+ protected:
+  Output faces_;
+
+ private:
+  [[nodiscard]] fs::path facesPath() const { return staged_.path().string() + "-faces"; }
+};
+
 /// Header of 80 bytes, count, and 50 bytes a triangle.
 class MeshWriter::Stl : public Format {
  public:
@@ -197,9 +212,9 @@ class MeshWriter::Stl : public Format {
   std::uint32_t first_ = 0;
 };
 
-class MeshWriter::Obj : public Format {
+class MeshWriter::Obj : public Indexed {
  public:
-  explicit Obj(const fs::path& path) : Format(path) { file_.append("# vdbdither, mm\n"); }
+  explicit Obj(const fs::path& path) : Indexed(path) { file_.append("# vdbdither, mm\n"); }
 
   void vertex(const Vec3s& position, const std::array<std::uint8_t, 3>*, const float*) override {
     file_.append("v");
@@ -210,20 +225,17 @@ class MeshWriter::Obj : public Format {
     file_.append("\n");
   }
   void triangle(const Mesh::Triangle& triangle) override {
-    file_.append("f");
+    faces_.append("f");
     for (const std::uint32_t vertex : triangle)
-      file_.append(" " + std::to_string(std::uint64_t{vertex} + 1));
-    file_.append("\n");
+      faces_.append(" " + std::to_string(std::uint64_t{vertex} + 1));
+    faces_.append("\n");
   }
-  void finish(std::uint64_t, std::uint64_t) override {}
+  void finish(std::uint64_t, std::uint64_t) override { file_.appendAllOf(faces_); }
 };
 
-/// All vertices stand before all faces, so the faces wait in a file that has lost its name.
-class MeshWriter::Ply : public Format {
+class MeshWriter::Ply : public Indexed {
  public:
-  Ply(const fs::path& path, VertexExtras extras)
-      : Format(path), extras_(std::move(extras)), faces_(facesPath(), path, O_CREAT | O_TRUNC) {
-    fs::remove(facesPath());
+  Ply(const fs::path& path, VertexExtras extras) : Indexed(path), extras_(std::move(extras)) {
     file_.append(header(0, 0));
   }
 
@@ -247,8 +259,6 @@ class MeshWriter::Ply : public Format {
   }
 
  private:
-  [[nodiscard]] fs::path facesPath() const { return staged_.path().string() + "-faces"; }
-
   /// Of the same length for every count.
   [[nodiscard]] std::string header(std::uint64_t vertices, std::uint64_t triangles) const {
     const std::string vertex_count = std::to_string(vertices);
@@ -267,7 +277,6 @@ class MeshWriter::Ply : public Format {
   }
 
   VertexExtras extras_;
-  Output faces_;
 };
 
 void MeshWriter::check(const fs::path& path, bool overwrite) {

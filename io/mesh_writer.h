@@ -52,6 +52,7 @@ class MeshWriter {
 
  private:
   class Format;
+  class Indexed;
   class Stl;
   class Obj;
   class Ply;

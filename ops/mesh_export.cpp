@@ -1,7 +1,7 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
+#include <vector>
 
 #include "io/mesh_writer.h"
 #include "ops/kernels/grid_surface.h"
@@ -13,20 +13,6 @@
 namespace vdbdither {
 
 namespace {
-
-/// The grid called `name`, or of "auto" the one furthest down the chain that has a surface.
-std::string surfaceGrid(const Grids& grids, const std::string& name) {
-  if (name != "auto" && grids.contains(name)) return name;
-  std::string there;
-  for (const char* known : {"printed", "solid", "displaced", "surface"}) {
-    if (name == "auto" && grids.contains(known)) return known;
-  }
-  for (const auto& [other, grid] : grids) there += " '" + other + "'";
-  throw DataError((name == "auto"
-                       ? std::string("no grid 'printed', 'solid', 'displaced' or 'surface'")
-                       : "no grid '" + name + "'") +
-                  "; there is" + (there.empty() ? " none" : there));
-}
 
 class MeshExport : public Sink {
  public:
@@ -46,7 +32,9 @@ class MeshExport : public Sink {
   }
 
   void plan(const Schema& in) override {
-    name_ = surfaceGrid(in.grids, grid_);
+    std::vector<std::string> there;
+    for (const auto& [name, grid] : in.grids) there.push_back(name);
+    name_ = chosenSurfaceGrid(there, grid_);
     std::optional<double> level;
     if (!level_.empty()) level = parseLengthMm(level_);
     surface_.emplace(in.lattice, *in.grids.at(name_), level);

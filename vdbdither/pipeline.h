@@ -68,6 +68,7 @@ class Pipeline {
   class Stage;
 
   void addStage(const Step& step);
+  [[nodiscard]] bool standsAlone() const;
   void planRanges();
   void planSlabs();
   void push(std::size_t index, Slab slab);

@@ -1,5 +1,6 @@
 #include "ops/kernels/grid_surface.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -20,6 +21,22 @@ std::string numberText(double value) {
 }
 
 }  // namespace
+
+std::string chosenSurfaceGrid(std::span<const std::string> there, const std::string& wanted) {
+  const auto isThere = [&](std::string_view name) {
+    return std::find(there.begin(), there.end(), name) != there.end();
+  };
+  std::string message = "no grid '" + wanted + "'; there is";
+  if (wanted == "auto") {
+    for (const std::string_view name : surface_grids) {
+      if (isThere(name)) return std::string(name);
+    }
+    message = "no grid 'printed', 'solid', 'displaced' or 'surface'; there is";
+  }
+  if (isThere(wanted)) return wanted;
+  for (const std::string& name : there) message += " '" + name + "'";
+  throw DataError(there.empty() ? message + " none" : message);
+}
 
 GridSurface::GridSurface(const Lattice& lattice, const openvdb::GridBase& prototype,
                          std::optional<double> level)

@@ -1,11 +1,24 @@
 #pragma once
 
+#include <array>
 #include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "ops/kernels/iso_surface.h"
 #include "vdbdither/grid.h"
 
 namespace vdbdither {
+
+/// The grids that have a surface as it is printed or meant, the furthest down a chain first.
+inline constexpr std::array<std::string_view, 4> surface_grids{"printed", "solid", "displaced",
+                                                               "surface"};
+
+/// `wanted` itself, or of "auto" the first of `surface_grids` that `there` holds. Throws DataError
+/// where it is not there.
+std::string chosenSurfaceGrid(std::span<const std::string> there, const std::string& wanted);
 
 /// The surface that a grid stands for: of a bool grid its voxels, of a level set the level 0, of a
 /// fog volume (an occupancy) the level ½.
