@@ -8,6 +8,7 @@
 #include <fcntl.h>
 #include <limits>
 #include <system_error>
+#include <type_traits>
 #include <unistd.h>
 #include <utility>
 
@@ -44,8 +45,10 @@ class Output {
     const auto* bytes = static_cast<const char*>(data);
     buffer_.insert(buffer_.end(), bytes, bytes + size);
   }
+  /// The bytes of a value.
   template <typename T>
-  void append(const T& value) {
+  void appendValue(const T& value) {
+    static_assert(std::is_trivially_copyable_v<T> && !std::is_pointer_v<T>);
     append(&value, sizeof(T));
   }
   void append(std::string_view text) { append(text.data(), text.size()); }
@@ -241,13 +244,13 @@ class MeshWriter::Ply : public Indexed {
 
   void vertex(const Vec3s& position, const std::array<std::uint8_t, 3>* colour,
               const float* quality) override {
-    file_.append(position);
-    if (extras_.colour) file_.append(*colour);
-    if (extras_.quality) file_.append(*quality);
+    file_.appendValue(position);
+    if (extras_.colour) file_.appendValue(*colour);
+    if (extras_.quality) file_.appendValue(*quality);
   }
   void triangle(const Mesh::Triangle& triangle) override {
-    faces_.append(std::uint8_t{3});
-    faces_.append(triangle);
+    faces_.appendValue(std::uint8_t{3});
+    faces_.appendValue(triangle);
   }
   void finish(std::uint64_t vertices, std::uint64_t triangles) override {
     file_.appendAllOf(faces_);

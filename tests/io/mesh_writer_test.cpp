@@ -50,7 +50,9 @@ TEST(MeshWriter, WhatItWritesReadsBackTheSameInEveryFormat) {
         EXPECT_EQ(read.vertices[read.triangles[t][n]], mesh.vertices[mesh.triangles[t][n]]);
       }
     }
-    if (std::string(name) != "a.stl") EXPECT_EQ(read.triangles, mesh.triangles);
+    if (std::string(name) != "a.stl") {
+      EXPECT_EQ(read.triangles, mesh.triangles);
+    }
   }
   EXPECT_EQ(test::filesUnder(scratch.path()).size(), 4U) << "nothing else is left";
 }
