@@ -47,7 +47,8 @@ TEST(MeshWriter, WhatItWritesReadsBackTheSameInEveryFormat) {
     ASSERT_EQ(read.triangles.size(), mesh.triangles.size());
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       for (std::size_t n = 0; n < 3; ++n) {
-        EXPECT_EQ(read.vertices[read.triangles[t][n]], mesh.vertices[mesh.triangles[t][n]]);
+        EXPECT_EQ(openvdb::Vec3s(read.vertices[read.triangles[t][n]]),
+                  openvdb::Vec3s(mesh.vertices[mesh.triangles[t][n]]));
       }
     }
     if (std::string(name) != "a.stl") {

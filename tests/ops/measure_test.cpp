@@ -80,8 +80,8 @@ class Measure : public testing::Test {
 
 TEST_F(Measure, AMeshOfItsOwnIsMeasuredWithoutAChain) {
   save(test::boxMesh(Vec3d(-0.01), Vec3d(2.01, 2.01, 1.01)), "result.stl");
-  const Measuring measuring({file("result.stl"), "--reference", file("part.stl"), "--report",
-                             file("report.json"), "--map", file("map.ply")});
+  const Measuring measuring({file("result.stl"), "--reference", file("part.stl"), "--margin", "0.1",
+                             "--report", file("report.json"), "--map", file("map.ply")});
   EXPECT_TRUE(measuring.sink().standsAlone());
   measuring.run({});
   const nlohmann::json report = jsonOf(scratch / "report.json");
@@ -127,7 +127,7 @@ TEST_F(Measure, VoxelsAreMeasuredAsTheyComeWithTheirPiecesAndCavities) {
   // The side at 2 mm is half a voxel outside, at 2.05; that at 0 half a voxel inside.
   EXPECT_NEAR(report["axes"]["x"]["mean_mm"], 0.05, 0.01);
   EXPECT_NEAR(report["axes"]["x"]["bias_mm"], 0, 0.01);
-  EXPECT_GT(report["axes"]["x"]["correlation"], 0.5);
+  EXPECT_GT(report["axes"]["x"]["correlation"], 0.3);
   EXPECT_TRUE(report["axes"]["z"].contains("staircase_mm"));
 }
 
