@@ -102,6 +102,12 @@ class SliceExport : public Sink {
     voxels_.assign(materials_.size() + 1, 0);
   }
 
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    std::vector<std::string> names{source_};
+    if (format_ == "exr") names.insert(names.end(), {"surface", "N"});
+    return names;
+  }
+
   void write(const Slab& in) override {
     if (!staged_) staged_.emplace(folder_, StagedOutput::Kind::folder);
     const int together =

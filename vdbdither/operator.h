@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -94,6 +95,11 @@ class Filter : public Operator {
 class Sink : public Operator {
  public:
   virtual void plan(const Schema& in) = 0;
+  /// The names of the grids it looks at, where it does not look at all of them: grids that nobody
+  /// looks at any more are let go early. Asked after `plan`.
+  [[nodiscard]] virtual std::optional<std::vector<std::string>> reads() const {
+    return std::nullopt;
+  }
   virtual void write(const Slab& in) = 0;
   /// Publishes. Before it returns, nothing exists under the name that the user gave.
   virtual void finish() = 0;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <fstream>
 #include <mutex>
+#include <set>
 #include <sstream>
 #include <sys/resource.h>
 
@@ -50,12 +51,20 @@ double bytesPerVoxel(const openvdb::GridBase& grid) {
   return type.starts_with("vec3") ? 3 * component : component;
 }
 
-/// What the leaves of one row (eight layers) of all grids take.
-double bytesPerRow(const Schema& schema) {
+using Names = std::set<std::string, std::less<>>;
+
+Names namesOf(const Schema& schema) {
+  Names names;
+  for (const auto& [name, grid] : schema.grids) names.insert(name);
+  return names;
+}
+
+/// What the leaves of one row (eight layers) of some grids take.
+double bytesPerRow(const Schema& schema, const Names& names) {
   constexpr double leaf_overhead_bytes = 128;
   double bytes = 0;
   for (const auto& [name, grid] : schema.grids)
-    bytes += 512 * bytesPerVoxel(*grid) + leaf_overhead_bytes;
+    if (names.contains(name)) bytes += 512 * bytesPerVoxel(*grid) + leaf_overhead_bytes;
   return bytes * schema.leaves_per_row;
 }
 
@@ -166,9 +175,11 @@ class Pipeline::Stage : public Reporter {
     }
   }
 
-  /// Grids that the schema promises and nobody made are empty.
-  void complete(Grids& grids) const {
+  /// Of the grids made, and of those that the schema promises and nobody made, which are empty:
+  /// what a later stage looks at.
+  void handOn(Grids& grids) const {
     for (const auto& [grid_name, prototype] : out_.grids) grids.try_emplace(grid_name, prototype);
+    std::erase_if(grids, [&](const auto& grid) { return !handed_on.contains(grid.first); });
   }
 
   [[nodiscard]] std::string name() const { return std::string(info_.name); }
@@ -186,7 +197,8 @@ class Pipeline::Stage : public Reporter {
   [[nodiscard]] bool standsAlone() const { return sink() && sink()->standsAlone(); }
 
   Watcher* watcher = nullptr;
-  ZRange cores;  ///< the layers this stage is to give out
+  ZRange cores;     ///< the layers this stage is to give out
+  Names handed_on;  ///< the grids that a later stage looks at
   std::optional<Window> window;
   int done_layers = 0;
   int total_layers = 0;
@@ -287,7 +299,20 @@ void Pipeline::plan(Watcher& watcher) {
   if (standsAlone()) return;
   wanted_ = parseLayers(options_.layers, in->lattice.layers());
   planRanges();
+  planNeeds();
   planSlabs();
+}
+
+void Pipeline::planNeeds() {
+  Names needed;
+  for (auto stage = stages_.rbegin(); stage != stages_.rend(); ++stage) {
+    (*stage)->handed_on = needed;
+    if ((*stage)->sink()) {
+      const auto reads = (*stage)->sink()->reads();
+      needed.merge(reads ? Names(reads->begin(), reads->end()) : namesOf((*stage)->out()));
+    }
+    for (const Read& read : (*stage)->reads()) needed.insert(read.grid);
+  }
 }
 
 void Pipeline::planRanges() {
@@ -337,15 +362,27 @@ double Pipeline::memoryBudgetBytes() const {
 double Pipeline::expectedMemoryBytes(int slab_layers) const {
   constexpr double program_bytes = 40e6;
   double bytes = program_bytes;
+  const Stage* before = nullptr;
   for (const auto& stage : stages_) {
     bytes += stage->memoryBytes();
-    // A window holds the slabs its reach covers, and the filter's input is a copy of them.
     const int all = stage->out().lattice.layers().size();
-    const Reach reach = widest(stage->reads());
-    const int window_layers =
-        reach.whole || stage->isBarrier() ? all : slab_layers + reach.below + reach.above;
-    const double rows = std::min(all, window_layers) / static_cast<double>(leaf_layers) + 1;
-    bytes += bytesPerRow(stage->out()) * rows * (stage->filter() ? 2 : 1);
+    const auto rows = [&](int layers) {
+      return std::min(all, layers) / static_cast<double>(leaf_layers) + 1;
+    };
+    if (stage->source()) {
+      bytes += bytesPerRow(stage->out(), namesOf(stage->out())) * rows(slab_layers);
+    } else if (before) {
+      const Reach reach = widest(stage->reads());
+      const int window_layers =
+          reach.whole || stage->isBarrier() ? all : slab_layers + reach.below + reach.above;
+      // A window holds the slabs its reach covers, and a filter's input is a copy of what it reads.
+      bytes += bytesPerRow(before->out(), before->handed_on) * rows(window_layers);
+      Names copied;
+      for (const Read& read : stage->reads()) copied.insert(read.grid);
+      if (reach.below + reach.above > 0)
+        bytes += bytesPerRow(before->out(), copied) * rows(window_layers);
+    }
+    before = stage.get();
   }
   return bytes;
 }
@@ -397,8 +434,8 @@ void Pipeline::run() {
     const int cut = begin - ((begin % slab_layers_) + slab_layers_) % slab_layers_ + slab_layers_;
     const ZRange core{begin, std::min(cut, source.cores.end)};
     Grids grids = source.timed([&] { return source.source()->run(core); });
-    source.complete(grids);
     if (options_.json || options_.verbose) source.countOutput(grids);
+    source.handOn(grids);
     push(1, {core, core, std::move(grids)});
     begin = core.end;
   }
@@ -423,11 +460,11 @@ void Pipeline::push(std::size_t index, Slab slab) {
   }
   for (Window::Task& task : stage.window->push(std::move(slab))) {
     Grids made = stage.timed([&] { return stage.filter()->run(task.input); });
+    if (options_.json || options_.verbose) stage.countOutput(made);
     for (const auto& [name, grid] : task.passing.grids) {
       if (stage.out().grids.contains(name)) made.try_emplace(name, grid);
     }
-    stage.complete(made);
-    if (options_.json || options_.verbose) stage.countOutput(made);
+    stage.handOn(made);
     const ZRange core = task.passing.core;
     task = {};
     push(index + 1, {core, core, std::move(made)});

@@ -70,6 +70,7 @@ class Pipeline {
   void addStage(const Step& step);
   [[nodiscard]] bool standsAlone() const;
   void planRanges();
+  void planNeeds();
   void planSlabs();
   void push(std::size_t index, Slab slab);
   [[nodiscard]] double expectedMemoryBytes(int slab_layers) const;
