@@ -191,6 +191,10 @@ class Measure : public Sink {
 
   [[nodiscard]] bool isBarrier() const override { return true; }
 
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    return std::vector<std::string>{name_};
+  }
+
   void write(const Slab& in) override {
     const GridConstPtr& grid = in.grids.at(name_);
     for (const BitLayer& layer : surface_->insideOf(grid, in.core)) components_->add(layer);

@@ -41,6 +41,10 @@ class MeshExport : public Sink {
     MeshWriter::check(file_, overwrite_);
   }
 
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    return std::vector<std::string>{name_};
+  }
+
   [[nodiscard]] bool isBarrier() const override { return smooth_ != "none"; }
 
   void write(const Slab& in) override { take(surface_->add(in.grids.at(name_), in.core)); }
