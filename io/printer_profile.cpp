@@ -26,13 +26,16 @@ class ProfileParser {
       problems_.emplace_back("the text is no JSON object");
       return;
     }
-    known(json, {"name", "title", "source", "pitch_mm", "build_mm", "materials"}, "");
+    known(json, {"name", "title", "source", "pitch_mm", "build_mm", "point_spread_mm", "materials"},
+          "");
     profile_.name = this->text(json, "name", "");
     if (profile_.name.empty()) problems_.emplace_back("there is no name");
     profile_.title = json.contains("title") ? this->text(json, "title", "") : profile_.name;
     profile_.source = json.contains("source") ? this->text(json, "source", "") : "";
     profile_.pitch_mm = lengths(json, "pitch_mm", 1e-4, 100);
     if (json.contains("build_mm")) profile_.build_mm = lengths(json, "build_mm", 0, 1e5);
+    if (json.contains("point_spread_mm"))
+      profile_.point_spread_mm = lengths(json, "point_spread_mm", 0, 10);
     const ordered_json materials = json.value("materials", ordered_json::array());
     if (!materials.is_array()) problems_.emplace_back("materials is no list");
     for (const ordered_json& entry : materials) material(entry);
@@ -165,6 +168,10 @@ std::string toJson(const PrinterProfile& profile) {
   json["source"] = profile.source;
   json["pitch_mm"] = {profile.pitch_mm[0], profile.pitch_mm[1], profile.pitch_mm[2]};
   json["build_mm"] = {profile.build_mm[0], profile.build_mm[1], profile.build_mm[2]};
+  if (!profile.point_spread_mm.isZero()) {
+    json["point_spread_mm"] = {profile.point_spread_mm[0], profile.point_spread_mm[1],
+                               profile.point_spread_mm[2]};
+  }
   json["materials"] = ordered_json::array();
   for (const Material& material : profile.materials) {
     json["materials"].push_back({{"name", material.name}, {"rgba", material.rgba}});

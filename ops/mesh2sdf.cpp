@@ -1,12 +1,10 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numbers>
-#include <numeric>
 
 #include "io/mesh_reader.h"
 #include "io/printer_profile.h"
 #include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/mesh_placement.h"
 #include "ops/kernels/mesh_repair.h"
 #include "ops/kernels/part_index.h"
 #include "vdbdither/errors.h"
@@ -21,22 +19,6 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::Vec3d;
 
-constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{
-    {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}, {"um", 0.001}}};
-
-struct Bounds {
-  Vec3d min, max;
-};
-
-Bounds boundsOf(const Mesh& mesh) {
-  Bounds bounds{mesh.vertices.front(), mesh.vertices.front()};
-  for (const Vec3d& vertex : mesh.vertices) {
-    bounds.min = openvdb::math::minComponent(bounds.min, vertex);
-    bounds.max = openvdb::math::maxComponent(bounds.max, vertex);
-  }
-  return bounds;
-}
-
 /// `meshes` in one, one after the other.
 Mesh joined(std::vector<Mesh> meshes) {
   Mesh all = std::move(meshes.front());
@@ -47,25 +29,6 @@ Mesh joined(std::vector<Mesh> meshes) {
       all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   }
   return all;
-}
-
-/// Turns about the axes x, then y, then z; quarter turns are exact.
-void rotate(Mesh& mesh, const Vec3d& degrees) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const double turn = std::remainder(degrees[axis], 360.0);
-    if (turn == 0) continue;
-    const bool quarters = std::fmod(turn, 90.0) == 0;
-    const double angle = turn * std::numbers::pi / 180;
-    const double cosine = quarters ? std::round(std::cos(angle)) : std::cos(angle);
-    const double sine = quarters ? std::round(std::sin(angle)) : std::sin(angle);
-    const int u = (axis + 1) % 3;
-    const int v = (axis + 2) % 3;
-    for (Vec3d& p : mesh.vertices) {
-      const double turned = cosine * p[u] - sine * p[v];
-      p[v] = sine * p[u] + cosine * p[v];
-      p[u] = turned;
-    }
-  }
 }
 
 /// `surface` from triangle meshes.
@@ -100,7 +63,7 @@ class MeshToSdf : public Source {
     const Vec3d pitch_mm = pitchMm(schema);
     band_ = bandFrom(band_text_);
     auto mesh = std::make_shared<Mesh>(readMeshes());
-    placeMesh(*mesh);
+    place(*mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
     questionSize(*mesh);
     schema.lattice = latticeAround(*mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
@@ -209,29 +172,11 @@ class MeshToSdf : public Source {
     }
   }
 
-  void placeMesh(Mesh& mesh) const {
-    const auto unit = std::find_if(units_mm.begin(), units_mm.end(),
-                                   [this](const auto& known) { return known.first == unit_; });
-    double factor = unit->second * scale_;
-    rotate(mesh, rotate_);
-    if (fit_mm_ > 0) {
-      const Bounds bounds = boundsOf(mesh);
-      const Vec3d extent = bounds.max - bounds.min;
-      const double longest = std::max({extent.x(), extent.y(), extent.z()});
-      if (!(longest > 0)) throw DataError("--fit: the mesh has no extent");
-      factor = fit_mm_ / longest;
-    }
-    for (Vec3d& vertex : mesh.vertices) vertex *= factor;
-    if (!place_) return;
-    const Vec3d corner = boundsOf(mesh).min;
-    for (Vec3d& vertex : mesh.vertices) vertex -= corner;
-  }
-
   /// Warns of a part that is hardly meant to be as large or as small as it is.
   void questionSize(const Mesh& mesh) const {
     constexpr double largest_mm = 3000;
     constexpr double least_mm = 0.1;
-    const Bounds bounds = boundsOf(mesh);
+    const MeshBounds bounds = boundsOf(mesh);
     const Vec3d size_mm = bounds.max - bounds.min;
     const double longest_mm = std::max({size_mm.x(), size_mm.y(), size_mm.z()});
     const auto rounded = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4); };
@@ -251,12 +196,10 @@ class MeshToSdf : public Source {
   /// Of the other units the one that brings the part nearest to the size of a hand.
   [[nodiscard]] std::string likelierUnit(double longest_mm) const {
     constexpr double hand_mm = 100;
-    const auto present = std::find_if(units_mm.begin(), units_mm.end(),
-                                      [this](const auto& unit) { return unit.first == unit_; });
     std::string_view likelier;
     double best_mm = 0;
     for (const auto& [name, factor] : units_mm) {
-      const double mm = longest_mm / present->second * factor;
+      const double mm = longest_mm / unitMm(unit_) * factor;
       const bool nearer =
           best_mm == 0 || std::abs(std::log(mm / hand_mm)) < std::abs(std::log(best_mm / hand_mm));
       if ((mm < longest_mm) == (longest_mm > hand_mm) && mm != longest_mm && nearer) {
@@ -273,7 +216,7 @@ class MeshToSdf : public Source {
   /// The voxels within a voxel diagonal of the mesh's bounding box; where y is refined, the same
   /// region in finer voxels.
   Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm) const {
-    const Bounds bounds = boundsOf(mesh);
+    const MeshBounds bounds = boundsOf(mesh);
     const double margin_mm = pitch_mm.length();
     for (int axis = 0; axis < 3; ++axis) {
       const double furthest_mm =

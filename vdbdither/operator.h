@@ -113,6 +113,9 @@ class Sink : public Operator {
   [[nodiscard]] virtual OutputEstimate output() const { return {}; }
   /// Whether the voxels leave by standard output. Asked once the options are read.
   [[nodiscard]] virtual bool writesToStandardOutput() const { return false; }
+  /// Whether it works on files that it names itself and no slab is to come: it is then planned with
+  /// an empty schema, finished, and the whole of its chain. Asked once the options are read.
+  [[nodiscard]] virtual bool standsAlone() const { return false; }
 };
 
 /// What the registry holds of an operator: `extern const OperatorInfo material_assign` in

@@ -199,6 +199,7 @@ class Pipeline::Stage : public Reporter {
   [[nodiscard]] Source* source() const { return dynamic_cast<Source*>(operator_.get()); }
   [[nodiscard]] Filter* filter() const { return dynamic_cast<Filter*>(operator_.get()); }
   [[nodiscard]] Sink* sink() const { return dynamic_cast<Sink*>(operator_.get()); }
+  [[nodiscard]] bool standsAlone() const { return sink() && sink()->standsAlone(); }
 
   Watcher* watcher = nullptr;
   ZRange cores;     ///< the layers this stage is to give out
@@ -222,6 +223,11 @@ Pipeline::Pipeline(const std::vector<Step>& steps) {
   for (const Step& step : steps) {
     addStage(step);
     if (help_) return;
+  }
+  if (standsAlone()) {
+    if (!options_.input.empty() || !options_.output.empty())
+      throw UsageError(stages_.front()->name() + ": names its own files, not --input or --output");
+    return;
   }
   if (!stages_.front()->source()) {
     std::vector<std::string> arguments;
@@ -269,8 +275,14 @@ void Pipeline::addStage(const Step& step) {
     throw UsageError(stage->name() + ": takes what comes to it and cannot read '" + file +
                      "' as well");
   }
+  if (!stages_.empty() && (stage->standsAlone() || standsAlone())) {
+    const std::string alone = stage->standsAlone() ? stage->name() : stages_.front()->name();
+    throw UsageError(alone + ": works on the files it names and is no part of a chain then");
+  }
   stages_.push_back(std::move(stage));
 }
+
+bool Pipeline::standsAlone() const { return stages_.front()->standsAlone(); }
 
 void Pipeline::plan(Watcher& watcher) {
   watcher_ = &watcher;
@@ -289,6 +301,7 @@ void Pipeline::plan(Watcher& watcher) {
       }
     }
   }
+  if (standsAlone()) return;
   wanted_ = parseLayers(options_.layers, in->lattice.layers());
   planRanges();
   planNeeds();
@@ -449,6 +462,7 @@ void Pipeline::run() {
     threads.emplace(tbb::global_control::max_allowed_parallelism, options_.threads);
   }
   Stage& source = *stages_.front();
+  if (standsAlone()) return source.timed([&] { source.sink()->finish(); });
   for (int begin = source.cores.begin; begin < source.cores.end;) {
     // Cuts lie at multiples of the height whatever the first layer is, so that slabs of two runs
     // coincide.

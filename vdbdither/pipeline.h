@@ -68,6 +68,7 @@ class Pipeline {
   class Stage;
 
   void addStage(const Step& step);
+  [[nodiscard]] bool standsAlone() const;
   void planRanges();
   void planNeeds();
   void planSlabs();

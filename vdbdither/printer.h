@@ -21,7 +21,10 @@ struct PrinterProfile {
   std::string title;        ///< as people call it
   std::string source;       ///< where these figures were taken from
   openvdb::Vec3d pitch_mm;  ///< voxel size across the carriage (x), along it (y), and the layer (z)
-  openvdb::Vec3d build_mm;  ///< usable volume; zero where unknown
+  openvdb::Vec3d build_mm{0, 0, 0};  ///< usable volume; zero where unknown
+  /// How far a droplet spreads: standard deviation of a Gaussian along each axis; zero where
+  /// unknown.
+  openvdb::Vec3d point_spread_mm{0, 0, 0};
   std::vector<Material>
       materials;  ///< model materials first to last; support is the printer's own affair
 };
