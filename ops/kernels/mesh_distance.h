@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "ops/kernels/leaf_distances.h"
 #include "ops/kernels/mesh_features.h"
 #include "vdbdither/lattice.h"
 #include "vdbdither/mesh.h"
@@ -60,7 +61,7 @@ struct DistanceGrids {
 /// is higher.
 class MeshDistance {
  public:
-  static constexpr int chunk_layers = 8 * leaf_layers;
+  static constexpr int chunk_layers = LeafDistances::depth * leaf_layers;
 
   /// `mesh` in mm. Positions are those of the lattice.
   MeshDistance(std::shared_ptr<const Mesh> mesh, const Lattice& lattice, Band band,
@@ -80,12 +81,11 @@ class MeshDistance {
   [[nodiscard]] double memoryBytes() const;
 
  private:
-  class Chunk;
+  class Block;
 
-  [[nodiscard]] double reachMm() const;
-  /// Makes `voxels`, which `features` may reach, in one piece or in several.
-  void append(const openvdb::CoordBBox& voxels, std::vector<std::uint32_t> features,
-              DistanceGrids& grids) const;
+  [[nodiscard]] double reachMm(int axis) const;
+  /// Makes `voxels`, of at most `chunk_layers` layers.
+  void append(const openvdb::CoordBBox& voxels, DistanceGrids& grids) const;
 
   std::shared_ptr<const Mesh> mesh_;
   Lattice lattice_;
@@ -94,6 +94,7 @@ class MeshDistance {
   MeshFeatures features_;
   std::vector<float>
       triangle_band_mm_;  ///< of the face and its edges; empty where the band is in mm
+  double widest_mm_ = 0;  ///< of these
 };
 
 }  // namespace vdbdither

@@ -21,9 +21,9 @@ using openvdb::Vec3d;
 
 namespace {
 
-/// How far regions reach over their borders, mm: far above the rounding at 1 m, far below what a
-/// distance may err.
-constexpr double slack_mm = 1e-9;
+/// How far regions reach over their borders, mm: far above the rounding at 1 m, below what a
+/// distance may err. What is thinner needs no region of its own.
+constexpr double slack_mm = 1e-7;
 
 /// Triangles lower than this are told by their edges alone.
 constexpr double least_height_mm = 1e-7;
@@ -74,22 +74,16 @@ Vec3d magnitudes(const Vec3d& v) { return {std::abs(v.x()), std::abs(v.y()), std
 Vec3d componentMin(const Vec3d& a, const Vec3d& b) { return openvdb::math::minComponent(a, b); }
 Vec3d componentMax(const Vec3d& a, const Vec3d& b) { return openvdb::math::maxComponent(a, b); }
 
-/// How far the directions between the unit vectors `a` and `b` reach along +x, +y and +z.
-Vec3d arcReach(const Vec3d& a, const Vec3d& b) {
-  const double cosine = a.dot(b);
-  if (cosine < 0.1) return {1, 1, 1};
-  const Vec3d tip = (a + b) / (1 + cosine);
-  return componentMax(componentMax(a, b), componentMax(tip, Vec3d(0, 0, 0)));
-}
-
 }  // namespace
 
-MeshFeatures::MeshFeatures(const Mesh& mesh, const Vec3d& origin_mm, double layer_mm)
+MeshFeatures::MeshFeatures(const Mesh& mesh, const Vec3d& origin_mm, double layer_mm,
+                           double greatest_mm)
     : mesh_(mesh), edges_(mesh) {
   positions_.reserve(mesh.vertices.size());
   for (const Vec3d& vertex : mesh.vertices) positions_.push_back(vertex - origin_mm);
   findNormals();
   findNeighbours();
+  findOwned(greatest_mm);
   sortByLayer(layer_mm);
 }
 
@@ -98,7 +92,7 @@ double MeshFeatures::memoryBytes() const {
     return static_cast<double>(vector.capacity() * sizeof(vector[0]));
   };
   return bytes(positions_) + bytes(normals_) + edges_.memoryBytes() + bytes(first_edge_) +
-         bytes(vertex_edges_) + bytes(order_) + bytes(blocks_);
+         bytes(vertex_edges_) + bytes(side_edges_) + bytes(owned_) + bytes(order_) + bytes(blocks_);
 }
 
 void MeshFeatures::findNormals() {
@@ -125,34 +119,40 @@ void MeshFeatures::findNeighbours() {
   }
 }
 
-MeshFeatures::Extent MeshFeatures::extent(Id id, int axis) const {
-  const auto of = [&](std::uint32_t vertex) { return positions_[vertex][axis]; };
-  switch (id.kind()) {
-    case Kind::face: {
-      const Mesh::Triangle& t = mesh_.triangles[id.index()];
-      const auto [low, high] = std::minmax({of(t[0]), of(t[1]), of(t[2])});
-      return {low, high};
-    }
-    case Kind::edge: {
-      const auto [low, high] =
-          std::minmax({of(edges_[id.index()].from), of(edges_[id.index()].to)});
-      return {low, high};
-    }
-    case Kind::vertex:
-      return {of(id.index()), of(id.index())};
+/// Whether the wedge beyond the faces of an edge is too thin to matter.
+bool MeshFeatures::isFlat(std::uint32_t edge, double greatest_mm) const {
+  const auto halves = edges_.halves(edge);
+  if (halves.size() != 2) return false;
+  const auto start = [&](std::size_t i) { return mesh_.triangles[halves[i] / 3][halves[i] % 3]; };
+  if (start(0) == start(1)) return false;
+  const Vec3d& a = normals_[halves[0] / 3];
+  const Vec3d& b = normals_[halves[1] / 3];
+  return a.dot(b) > 0 && a.cross(b).length() * greatest_mm < slack_mm;
+}
+
+void MeshFeatures::findOwned(double greatest_mm) {
+  side_edges_.assign(3 * mesh_.triangles.size(), 0);
+  owned_.assign(mesh_.triangles.size(), 0);
+  std::vector<bool> flat(edges_.size());
+  for (std::uint32_t e = 0; e < edges_.size(); ++e) {
+    for (const std::uint32_t half : edges_.halves(e)) side_edges_[half] = e;
+    flat[e] = isFlat(e, greatest_mm);
+    const std::uint32_t owner = edges_.halves(e).front();
+    if (!flat[e]) owned_[owner / 3] |= static_cast<std::uint8_t>(1U << owner % 3);
   }
-  return {0, 0};
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    const auto begin = vertex_edges_.begin() + first_edge_[v];
+    const auto end = vertex_edges_.begin() + first_edge_[v + 1];
+    if (std::all_of(begin, end, [&](std::uint32_t e) { return flat[e]; })) continue;
+    const std::uint32_t owner = triangleOf(Id(Kind::vertex, v));
+    const Mesh::Triangle& t = mesh_.triangles[owner];
+    owned_[owner] |=
+        static_cast<std::uint8_t>(8U << (std::find(t.begin(), t.end(), v) - t.begin()));
+  }
 }
 
 void MeshFeatures::sortByLayer(double layer_mm) {
-  std::vector<Id> all;
-  all.reserve(mesh_.triangles.size() + edges_.size() + positions_.size());
-  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) all.emplace_back(Kind::face, t);
-  for (std::uint32_t e = 0; e < edges_.size(); ++e) all.emplace_back(Kind::edge, e);
-  for (std::uint32_t v = 0; v < positions_.size(); ++v)
-    if (first_edge_[v] < first_edge_[v + 1]) all.emplace_back(Kind::vertex, v);
-  if (all.empty()) return;
-
+  if (mesh_.triangles.empty()) return;
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   for (const Vec3d& p : positions_) {
@@ -160,14 +160,16 @@ void MeshFeatures::sortByLayer(double layer_mm) {
     high = std::max(high, p.z());
   }
   const double bin_mm = std::max(layer_mm, (high - low) / 1e6);
-  const auto bin = [&](Id id) {
-    return static_cast<std::size_t>(std::max(0.0, (extent(id, 2).low - low) / bin_mm));
-  };
+  const auto count = static_cast<std::uint32_t>(mesh_.triangles.size());
+  std::vector<std::uint32_t> bins(count);
   std::vector<std::uint32_t> first(static_cast<std::size_t>((high - low) / bin_mm) + 2, 0);
-  for (const Id id : all) ++first[bin(id) + 1];
+  for (std::uint32_t t = 0; t < count; ++t) {
+    bins[t] = static_cast<std::uint32_t>(std::max(0.0, (extent(t, 2).low - low) / bin_mm));
+    ++first[bins[t] + 1];
+  }
   for (std::size_t b = 1; b < first.size(); ++b) first[b] += first[b - 1];
-  order_.resize(all.size());
-  for (const Id id : all) order_[first[bin(id)]++] = id;
+  order_.resize(count);
+  for (std::uint32_t t = 0; t < count; ++t) order_[first[bins[t]]++] = t;
 
   for (std::size_t begin = 0; begin < order_.size(); begin += block_size) {
     Extent block = extent(order_[begin], 2);
@@ -185,8 +187,8 @@ std::vector<std::uint32_t> MeshFeatures::collect(double low, double high) const 
     if (blocks_[b].low > high || blocks_[b].high < low) continue;
     const std::size_t end = std::min((b + 1) * block_size, order_.size());
     for (std::size_t i = b * block_size; i < end; ++i) {
-      const auto position = static_cast<std::uint32_t>(i);
-      if (meets(position, 2, low, high)) found.push_back(position);
+      const Extent one = extent(order_[i], 2);
+      if (one.low <= high && one.high >= low) found.push_back(order_[i]);
     }
   }
   return found;
@@ -215,11 +217,11 @@ MeshFeature MeshFeatures::describeFace(std::uint32_t triangle) const {
   if (n == Vec3d(0, 0, 0)) return face;
   face.rank = 1;
   face.bounds = 3;
-  face.forms[0] = formThrough(n, corner(triangle, 0));
+  face.distance[0] = formThrough(n, corner(triangle, 0));
   for (int side = 0; side < 3; ++side) {
     const Vec3d& a = corner(triangle, side);
     const Vec3d& b = corner(triangle, (side + 1) % 3);
-    face.forms[static_cast<std::size_t>(1 + side)] = halfSpace(n.cross(b - a), a);
+    face.bound[static_cast<std::size_t>(side)] = halfSpace(n.cross(b - a), a);
   }
   return face;
 }
@@ -237,8 +239,8 @@ MeshFeature MeshFeatures::describeEdge(std::uint32_t index) const {
   const Vec3d along = (b - a) / length;
 
   feature.rank = 2;
-  feature.forms[2] = halfSpace(along, a);
-  feature.forms[3] = halfSpace(-along, b);
+  feature.bound[0] = halfSpace(along, a);
+  feature.bound[1] = halfSpace(-along, b);
   feature.bounds = 2;
   std::array<Vec3d, 2> normals;
   std::array<Vec3d, 2> outwards;
@@ -255,16 +257,25 @@ MeshFeature MeshFeatures::describeEdge(std::uint32_t index) const {
     }
     ++faces;
     if (feature.bounds < MeshFeature::max_bounds)
-      feature.forms[static_cast<std::size_t>(2 + feature.bounds++)] = halfSpace(outward, a);
+      feature.bound[static_cast<std::size_t>(feature.bounds++)] = halfSpace(outward, a);
   }
   const Vec3d across = faces > 0 ? normals[0] : anyPerpendicular(along);
-  feature.forms[0] = formThrough(across, a);
-  feature.forms[1] = formThrough(along.cross(across), a);
+  feature.distance[0] = formThrough(across, a);
+  feature.distance[1] = formThrough(along.cross(across), a);
   if (faces == 2) {
     const Vec3d first = outwards[1].dot(normals[0]) < 0 ? -normals[0] : normals[0];
     const Vec3d second = outwards[0].dot(normals[1]) < 0 ? -normals[1] : normals[1];
-    feature.above = arcReach(first, second);
-    feature.below = arcReach(-first, -second);
+    const double cosine = first.dot(second);
+    if (cosine > 0.1) {
+      // No direction between the two reaches further along an axis than one of them or `tip`.
+      const Vec3d middle = first + second;
+      const Vec3d tip = middle * (1 / (1 + cosine));
+      const Vec3d none(0, 0, 0);
+      feature.above = componentMax(componentMax(first, second), componentMax(tip, none));
+      feature.below = -componentMin(componentMin(first, second), componentMin(tip, none));
+      feature.capped = true;
+      feature.cap = formThrough(middle / middle.length(), a);
+    }
   }
   return feature;
 }
@@ -278,15 +289,32 @@ MeshFeature MeshFeatures::describeVertex(std::uint32_t index) const {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Vec3d unit(0, 0, 0);
     unit[static_cast<int>(axis)] = 1;
-    feature.forms[axis] = formThrough(unit, p);
+    feature.distance[axis] = formThrough(unit, p);
   }
   for (std::uint32_t i = first_edge_[index]; i < first_edge_[index + 1]; ++i) {
     if (feature.bounds == MeshFeature::max_bounds) break;
     const MeshEdges::Edge& edge = edges_[vertex_edges_[i]];
     const Vec3d& other = positions_[edge.from == index ? edge.to : edge.from];
-    feature.forms[static_cast<std::size_t>(3 + feature.bounds++)] = halfSpace(p - other, p);
+    feature.bound[static_cast<std::size_t>(feature.bounds++)] = halfSpace(p - other, p);
   }
   return feature;
+}
+
+Vec3d MeshFeatures::away(Id id, const Vec3d& p) const {
+  switch (id.kind()) {
+    case Kind::face: {
+      const Vec3d& n = normals_[id.index()];
+      return n * n.dot(p - corner(id.index(), 0));
+    }
+    case Kind::edge: {
+      const Vec3d& a = positions_[edges_[id.index()].from];
+      const Vec3d along = positions_[edges_[id.index()].to] - a;
+      return p - a - along * (along.dot(p - a) / along.lengthSqr());
+    }
+    case Kind::vertex:
+      return p - positions_[id.index()];
+  }
+  return {0, 0, 0};
 }
 
 std::vector<Vec3d> MeshFeatures::leastNormals() const {
