@@ -63,22 +63,22 @@ template <int rank, bool track>
   const double k_first = first.z();
   const double k_last = last.z();
   std::array<Limit, LatticeRegion::max_bounds> floors, ceilings, walls;
-  int floor_count = 0;
-  int ceiling_count = 0;
-  int wall_count = 0;
+  std::size_t floor_count = 0;
+  std::size_t ceiling_count = 0;
+  std::size_t wall_count = 0;
   for (int b = 0; b < region.bounds; ++b) {
     const LatticeForm& form = region.bound[static_cast<std::size_t>(b)];
     constexpr double level = 1e-100;
     if (std::abs(form.z) < level) {
-      walls[static_cast<std::size_t>(wall_count++)] = {form.x, form.y, form.constant};
+      walls[wall_count++] = {form.x, form.y, form.constant};
       continue;
     }
     const double inverse = -1 / form.z;
     const Limit limit{form.x * inverse, form.y * inverse, form.constant * inverse};
     if (form.z > 0) {
-      floors[static_cast<std::size_t>(floor_count++)] = limit;
+      floors[floor_count++] = limit;
     } else {
-      ceilings[static_cast<std::size_t>(ceiling_count++)] = limit;
+      ceilings[ceiling_count++] = limit;
     }
   }
 
@@ -109,24 +109,26 @@ template <int rank, bool track>
       if (!(j_low <= j_high)) continue;
     }
     const int j_end = roundedDown(j_high) + 1;
+    std::array<double, LatticeRegion::max_bounds> floor_rows, ceiling_rows;
+    for (std::size_t f = 0; f < floor_count; ++f)
+      floor_rows[f] = floors[f].constant + floors[f].x * i;
+    for (std::size_t c = 0; c < ceiling_count; ++c)
+      ceiling_rows[c] = ceilings[c].constant + ceilings[c].x * i;
     const auto leaf_x = static_cast<std::size_t>(((base.x() + i) >> 3) - leaves.leaves().min().x());
     for (int j = roundedUp(j_low); j < j_end; j += lanes) {
       const Doubles columns = ramp + static_cast<double>(j);
       Doubles low = Doubles{} + k_first;
       Doubles high = Doubles{} + k_last;
-      for (int f = 0; f < floor_count; ++f) {
-        const Limit& limit = floors[static_cast<std::size_t>(f)];
-        const Doubles at = columns * limit.y + (limit.constant + limit.x * i);
+      for (std::size_t f = 0; f < floor_count; ++f) {
+        const Doubles at = columns * floors[f].y + floor_rows[f];
         low = at > low ? at : low;
       }
-      for (int c = 0; c < ceiling_count; ++c) {
-        const Limit& limit = ceilings[static_cast<std::size_t>(c)];
-        const Doubles at = columns * limit.y + (limit.constant + limit.x * i);
+      for (std::size_t c = 0; c < ceiling_count; ++c) {
+        const Doubles at = columns * ceilings[c].y + ceiling_rows[c];
         high = at < high ? at : high;
       }
-      for (int w = 0; w < wall_count; ++w) {
-        const Limit& wall = walls[static_cast<std::size_t>(w)];
-        const Doubles at = columns * wall.y + (wall.constant + wall.x * i);
+      for (std::size_t w = 0; w < wall_count; ++w) {
+        const Doubles at = columns * walls[w].y + (walls[w].constant + walls[w].x * i);
         high = at < 0 ? Doubles{} + nowhere : high;
       }
       high = columns < static_cast<double>(j_end) ? high : Doubles{} + nowhere;
@@ -236,10 +238,18 @@ template <int rank, bool track>
   }
 }
 
+/// The sign bits of four voxels, by the bits of those that are inside.
+constexpr std::array<std::array<std::int32_t, lanes>, 16> signs = [] {
+  std::array<std::array<std::int32_t, lanes>, 16> made{};
+  for (unsigned bits = 0; bits < 16; ++bits)
+    for (unsigned lane = 0; lane < lanes; ++lane)
+      if (bits >> lane & 1) made[bits][lane] = std::numeric_limits<std::int32_t>::min();
+  return made;
+}();
+
 [[gnu::always_inline]] inline LeafBits finishAll(const float* distances, const LeafBits& inside,
                                                  const LeafBits& exists, float limit_mm,
                                                  float background_mm, float* values) {
-  const Integers bit{1, 2, 4, 8};
   const Floats background = Floats{} + background_mm;
   LeafBits active;
   for (std::size_t plane = 0; plane < edge; ++plane) {
@@ -247,17 +257,19 @@ template <int rank, bool track>
     for (int v = 0; v < edge * edge; v += lanes) {
       const int offset = static_cast<int>(plane) * edge * edge + v;
       const auto& distance = *reinterpret_cast<const Floats*>(distances + offset);
-      const auto existing = Integers{} + static_cast<std::int32_t>(exists[plane] >> v & 15);
-      const auto within = Integers{} + static_cast<std::int32_t>(inside[plane] >> v & 15);
-      const Integers on = (distance < limit_mm) & ((existing & bit) != 0);
-      const Floats magnitude = on ? distance : background;
-      *reinterpret_cast<Floats*>(values + offset) =
-          (within & bit) != 0 ? Floats{} - magnitude : magnitude;
+      Integers on = distance < limit_mm;
+      if (exists[plane] != ~0ULL)
+        for (int lane = 0; lane < lanes; ++lane)
+          if (!(exists[plane] >> (v + lane) & 1)) on[lane] = 0;
+      Floats value = on ? distance : background;
+      reinterpret_cast<Integers&>(value) |=
+          reinterpret_cast<const Integers&>(signs[inside[plane] >> v & 15]);
+      *reinterpret_cast<Floats*>(values + offset) = value + 0.0F;  // no negative zero
 #ifdef __SSE2__
       const auto marks =
           static_cast<unsigned>(_mm_movemask_ps(reinterpret_cast<const __m128&>(on)));
 #else
-      const Integers set = on & bit;
+      const Integers set = on & Integers{1, 2, 4, 8};
       const auto marks = static_cast<unsigned>(set[0] | set[1] | set[2] | set[3]);
 #endif
       found |= std::uint64_t{marks} << v;
@@ -312,6 +324,8 @@ void LeafDistances::begin(const openvdb::CoordBBox& leaves, bool track) {
   occupied_.assign(static_cast<std::size_t>(leaves.dim().x()), 0);
   distances_.assign(count, nullptr);
   names_.assign(track ? count : 0, nullptr);
+  last_note_.assign(count, none);
+  notes_.clear();
   distance_pool_.used = 0;
   name_pool_.used = 0;
 }

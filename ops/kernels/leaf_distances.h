@@ -10,8 +10,8 @@
 
 namespace vdbdither {
 
-/// The distances of a box of leaves while their nearest features are sought. A leaf comes into
-/// being where a feature first reaches it.
+/// What is known of a box of leaves while their nearest features are sought: distances, and items
+/// that were noted. The distances of a leaf come into being where a feature first reaches it.
 class LeafDistances {
  public:
   /// The most leaves that a box may hold along z, and along y.
@@ -41,9 +41,21 @@ class LeafDistances {
   /// Makes the leaf at `slot`, all of it infinitely far.
   float* make(std::size_t slot);
 
-  /// Notes that there is something at `slot`; making a leaf notes it too.
-  void occupy(std::size_t slot) { occupied_[slot / stride()] |= 1ULL << slot % stride(); }
-  /// Bit depth · y + z for the leaves at the coordinate x where there is something.
+  /// Keeps `item` at `slot`.
+  void note(std::size_t slot, std::uint32_t item) {
+    occupy(slot);
+    notes_.push_back({item, last_note_[slot]});
+    last_note_[slot] = static_cast<std::uint32_t>(notes_.size() - 1);
+  }
+  /// Calls visit(item) for what was noted at `slot`, the last first.
+  template <class Visit>
+  void visitNotes(std::size_t slot, const Visit& visit) const {
+    for (std::uint32_t at = last_note_[slot]; at != none; at = notes_[at].before)
+      visit(notes_[at].item);
+  }
+  [[nodiscard]] bool noted(std::size_t slot) const { return last_note_[slot] != none; }
+
+  /// Bit depth · y + z for the leaves at the coordinate x where there are distances or notes.
   [[nodiscard]] std::uint64_t occupied(int x) const {
     return occupied_[static_cast<std::size_t>(x - leaves_.min().x())];
   }
@@ -57,12 +69,21 @@ class LeafDistances {
     Value* take();
   };
 
+  struct Note {
+    std::uint32_t item, before;
+  };
+  static constexpr std::uint32_t none = 0xffffffffU;
+
+  void occupy(std::size_t slot) { occupied_[slot / stride()] |= 1ULL << slot % stride(); }
+
   openvdb::CoordBBox leaves_;
   std::size_t rows_ = 0;
   bool track_ = false;
   std::vector<std::uint64_t> occupied_;
   std::vector<float*> distances_;
   std::vector<std::uint32_t*> names_;
+  std::vector<std::uint32_t> last_note_;
+  std::vector<Note> notes_;
   Pool<float> distance_pool_;
   Pool<std::uint32_t> name_pool_;
 };

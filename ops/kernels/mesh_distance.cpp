@@ -73,15 +73,15 @@ class RowWinding {
   /// The inside of the last plane.
   [[nodiscard]] std::uint64_t bits() const { return bits_; }
 
-  /// The inside of the next leaf, whose crossings were packed.
-  LeafBits advance(std::span<const std::uint32_t> crossings) {
+  /// The inside of the next leaf, at `slot`, where crossings were noted.
+  LeafBits advance(const LeafDistances& noted, std::size_t slot) {
     LeafBits inside;
     inside.fill(bits_);
-    if (crossings.empty()) return inside;
+    if (!noted.noted(slot)) return inside;
     // Rows of a plane that enter and leave; the few that do so more than once wait in `again`.
     std::array<LeafBits, 2> once{};
     std::vector<std::uint32_t> again;
-    for (const std::uint32_t crossing : crossings) {
+    noted.visitNotes(slot, [&](std::uint32_t crossing) {
       const std::uint32_t plane = crossing >> 7;
       const std::uint64_t row = 1ULL << ((crossing >> 1) & 63);
       if (once[~crossing & 1][plane] & row) {
@@ -91,17 +91,19 @@ class RowWinding {
       } else {
         once[crossing & 1][plane] |= row;
       }
-    }
+    });
     for (std::size_t plane = 0; plane < edge; ++plane) {
-      lower(once[0][plane]);
-      raise(once[1][plane]);
-      for (const std::uint32_t crossing : again) {
-        if (crossing >> 7 != plane) continue;
-        const std::uint64_t row = 1ULL << ((crossing >> 1) & 63);
-        (crossing & 1) ? raise(row) : lower(row);
+      if ((once[0][plane] | once[1][plane]) != 0 || !again.empty()) {
+        lower(once[0][plane]);
+        raise(once[1][plane]);
+        for (const std::uint32_t crossing : again) {
+          if (crossing >> 7 != plane) continue;
+          const std::uint64_t row = 1ULL << ((crossing >> 1) & 63);
+          (crossing & 1) ? raise(row) : lower(row);
+        }
+        bits_ = 0;
+        for (const std::uint64_t digit : digits_) bits_ |= digit;
       }
-      bits_ = 0;
-      for (const std::uint64_t digit : digits_) bits_ |= digit;
       inside[plane] = bits_;
     }
     return inside;
@@ -193,7 +195,6 @@ class MeshDistance::Block {
   struct Workspace {
     LeafDistances distances;
     std::vector<float> bands_mm;  ///< of every leaf; empty where it is the same for all
-    std::vector<Bins::Entry> crossings;
   };
   struct Leaf {
     std::unique_ptr<openvdb::FloatTree::LeafNodeType> surface;
@@ -228,7 +229,7 @@ class MeshDistance::Block {
   void markBand(std::uint32_t triangle);
   void enter(std::uint32_t triangle);
   void lower(MeshFeatures::Id id, double band_mm);
-  [[nodiscard]] Made sweep(const Bins& crossings) const;
+  [[nodiscard]] Made sweep() const;
   void makeLeaf(const Coord& leaf_index, const LeafBits& inside, Made& made) const;
   void addExtras(Leaf& leaf, const std::uint32_t* names) const;
 
@@ -247,15 +248,13 @@ class MeshDistance::Block {
 MeshDistance::Block::Made MeshDistance::Block::make(std::span<const std::uint32_t> triangles) {
   const bool track = field_.extras_.normals || field_.extras_.closest;
   work_.distances.begin(leaves_, track);
-  work_.crossings.clear();
   work_.bands_mm.clear();
   if (!(field_.band_.mm > 0)) {
     work_.bands_mm.resize(work_.distances.slots(), 0);
     for (const std::uint32_t triangle : triangles) markBand(triangle);
   }
   for (const std::uint32_t triangle : triangles) enter(triangle);
-  const Bins crossings(work_.distances.slots(), work_.crossings);
-  return sweep(crossings);
+  return sweep();
 }
 
 /// The voxels within a box; empty where there are none.
@@ -314,9 +313,7 @@ void MeshDistance::Block::enter(std::uint32_t triangle) {
   for (const int axis : {2, 1})
     if (low[axis] > high_mm_[axis] || high[axis] < low_mm_[axis]) return;
   visitRowCrossings({a, b, c}, pitch_mm_, voxels_, [&](const Coord& ijk, int delta) {
-    const std::size_t slot = work_.distances.slot(ijk >> 3);
-    work_.distances.occupy(slot);
-    work_.crossings.push_back({static_cast<std::uint32_t>(slot), RowWinding::pack(ijk, delta)});
+    work_.distances.note(work_.distances.slot(ijk >> 3), RowWinding::pack(ijk, delta));
   });
   const CoordBBox reach = reachOf(low - greatest_mm_, high + greatest_mm_);
   if (reach.empty()) return;
@@ -337,6 +334,7 @@ void MeshDistance::Block::enter(std::uint32_t triangle) {
 }
 
 void MeshDistance::Block::lower(MeshFeatures::Id id, double band_mm) {
+  if (!all_.meets(id, low_mm_, high_mm_)) return;
   const MeshFeature feature = all_.describe(id);
   if (feature.rank == 0) return;
   LatticeRegion region;
@@ -377,7 +375,7 @@ LeafBits MeshDistance::Block::existing(const Coord& origin) const {
 }
 
 /// Along x, all rows of leaves at once.
-MeshDistance::Block::Made MeshDistance::Block::sweep(const Bins& crossings) const {
+MeshDistance::Block::Made MeshDistance::Block::sweep() const {
   Made made;
   std::array<RowWinding, block_rows * LeafDistances::depth> rows;
   std::uint64_t filled = 0;  // rows with some of the inside in the last plane
@@ -394,7 +392,7 @@ MeshDistance::Block::Made MeshDistance::Block::sweep(const Bins& crossings) cons
         made.interior.push_back(box.min());
         continue;
       }
-      makeLeaf(leaf, winding.advance(crossings.of(first + row)), made);
+      makeLeaf(leaf, winding.advance(work_.distances, first + row), made);
       filled = (filled & ~(1ULL << row)) | std::uint64_t{winding.bits() != 0} << row;
     }
   }

@@ -97,6 +97,16 @@ class MeshFeatures {
       if (owned >> (3 + corner) & 1) visit(Id(Kind::vertex, mesh_.triangles[triangle][corner]));
   }
 
+  /// Whether the feature's bounding box meets the layers and rows [low, high] mm; any face does.
+  [[nodiscard]] bool meets(Id id, const openvdb::Vec3d& low, const openvdb::Vec3d& high) const {
+    if (id.kind() == Kind::face) return true;
+    const bool edge = id.kind() == Kind::edge;
+    const openvdb::Vec3d& a = positions_[edge ? edges_[id.index()].from : id.index()];
+    const openvdb::Vec3d& b = positions_[edge ? edges_[id.index()].to : id.index()];
+    return std::min(a.z(), b.z()) <= high.z() && std::max(a.z(), b.z()) >= low.z() &&
+           std::min(a.y(), b.y()) <= high.y() && std::max(a.y(), b.y()) >= low.y();
+  }
+
   [[nodiscard]] MeshFeature describe(Id id) const;
 
   /// From the nearest point of the feature's plane, line or point to p.
