@@ -98,14 +98,14 @@ class MeshToSdf : public Source {
     Schema schema;
     const Vec3d pitch_mm = pitchMm(schema);
     band_ = bandFrom(band_text_);
-    auto mesh = std::make_shared<Mesh>(readMeshes());
-    placeMesh(*mesh);
-    schema.lattice = latticeAround(*mesh, pitch_mm);
+    Mesh mesh = readMeshes();
+    placeMesh(mesh);
+    schema.lattice = latticeAround(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
-    planParts(*mesh, lattice);
-    repair(*mesh);
-    schema.leaves_per_row = leavesPerRow(*mesh, lattice);
-    field_ = std::make_unique<MeshDistance>(std::move(mesh), lattice, band_, extras_);
+    planParts(mesh, lattice);
+    repair(mesh);
+    schema.leaves_per_row = leavesPerRow(mesh, lattice);
+    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
@@ -197,8 +197,7 @@ class MeshToSdf : public Source {
       const auto begin = all.triangles.begin() + static_cast<std::ptrdiff_t>(first);
       part.triangles.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
       MeshRepairs repairs;
-      parts_.emplace_back(std::make_shared<Mesh>(repaired(std::move(part), repairs)), lattice,
-                          band_);
+      parts_.emplace_back(repaired(std::move(part), repairs), lattice, band_);
       first += count;
     }
   }

@@ -457,7 +457,8 @@ void MeshDistance::Block::addExtras(Leaf& leaf, const std::uint32_t* names) cons
     const openvdb::Index v = it.pos();
     const MeshFeatures::Id id(names[v]);
     const std::uint32_t triangle = all_.triangleOf(id);
-    if (leaf.closest) leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(triangle);
+    if (leaf.closest)
+      leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(all_.original(triangle));
     if (!leaf.normals) continue;
     const Vec3d away = all_.away(id, it.getCoord().asVec3d() * pitch_mm_);
     const double distance = away.length();
@@ -484,13 +485,13 @@ double bandAcross(const Vec3d& least, const Vec3d& pitch_mm) {
 
 }  // namespace
 
-MeshDistance::MeshDistance(std::shared_ptr<const Mesh> mesh, const Lattice& lattice, Band band,
+MeshDistance::MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band,
                            DistanceExtras extras)
-    : mesh_(std::move(mesh)),
-      lattice_(lattice),
+    : lattice_(lattice),
       band_(band),
       extras_(extras),
-      features_(*mesh_, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers,
+      features_(mesh, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers,
+                lattice.pitch_mm.y() * leaf_layers * block_rows,
                 band.greatestMm(lattice.pitch_mm)) {
   if (band_.mm > 0) return;
   for (const Vec3d& least : features_.leastNormals())
@@ -500,9 +501,7 @@ MeshDistance::MeshDistance(std::shared_ptr<const Mesh> mesh, const Lattice& latt
 }
 
 double MeshDistance::memoryBytes() const {
-  return static_cast<double>(mesh_->vertices.size() * sizeof(Vec3d) +
-                             mesh_->triangles.size() * sizeof(Mesh::Triangle)) +
-         static_cast<double>(triangle_band_mm_.capacity() * sizeof(float)) +
+  return static_cast<double>(triangle_band_mm_.capacity() * sizeof(float)) +
          features_.memoryBytes();
 }
 

@@ -63,9 +63,8 @@ class MeshDistance {
  public:
   static constexpr int chunk_layers = LeafDistances::depth * leaf_layers;
 
-  /// `mesh` in mm. Positions are those of the lattice.
-  MeshDistance(std::shared_ptr<const Mesh> mesh, const Lattice& lattice, Band band,
-               DistanceExtras extras = {});
+  /// `mesh` in mm, not used after this. Positions are those of the lattice.
+  MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band, DistanceExtras extras = {});
 
   /// The layers of `core`, clipped to the lattice's box. Const, in any order, from many threads at
   /// once.
@@ -77,7 +76,7 @@ class MeshDistance {
 
   [[nodiscard]] double backgroundMm() const { return band_.greatestMm(lattice_.pitch_mm); }
 
-  /// Bytes held from construction on, the mesh included.
+  /// Bytes held from construction on, a copy of the mesh included.
   [[nodiscard]] double memoryBytes() const;
 
  private:
@@ -87,7 +86,6 @@ class MeshDistance {
   /// Makes `voxels`, of at most `chunk_layers` layers.
   void append(const openvdb::CoordBBox& voxels, DistanceGrids& grids) const;
 
-  std::shared_ptr<const Mesh> mesh_;
   Lattice lattice_;
   Band band_;
   DistanceExtras extras_;

@@ -28,7 +28,7 @@ constexpr double slack_mm = 1e-7;
 /// Triangles lower than this are told by their edges alone.
 constexpr double least_height_mm = 1e-7;
 
-constexpr std::size_t block_size = 256;
+constexpr std::uint32_t block_size = 256;
 
 double manhattanLength(const Vec3d& v) {
   return std::abs(v.x()) + std::abs(v.y()) + std::abs(v.z());
@@ -76,23 +76,22 @@ Vec3d componentMax(const Vec3d& a, const Vec3d& b) { return openvdb::math::maxCo
 
 }  // namespace
 
-MeshFeatures::MeshFeatures(const Mesh& mesh, const Vec3d& origin_mm, double layer_mm,
+MeshFeatures::MeshFeatures(const Mesh& mesh, const Vec3d& origin_mm, double layer_mm, double row_mm,
                            double greatest_mm)
-    : mesh_(mesh), edges_(mesh) {
-  positions_.reserve(mesh.vertices.size());
-  for (const Vec3d& vertex : mesh.vertices) positions_.push_back(vertex - origin_mm);
+    : mesh_(sorted(mesh, origin_mm, layer_mm, row_mm)), edges_(mesh_) {
   findNormals();
   findNeighbours();
   findOwned(greatest_mm);
-  sortByLayer(layer_mm);
+  findBlocks();
 }
 
 double MeshFeatures::memoryBytes() const {
   const auto bytes = [](const auto& vector) {
     return static_cast<double>(vector.capacity() * sizeof(vector[0]));
   };
-  return bytes(positions_) + bytes(normals_) + edges_.memoryBytes() + bytes(first_edge_) +
-         bytes(vertex_edges_) + bytes(side_edges_) + bytes(owned_) + bytes(order_) + bytes(blocks_);
+  return bytes(mesh_.vertices) + bytes(mesh_.triangles) + bytes(normals_) + edges_.memoryBytes() +
+         bytes(first_edge_) + bytes(vertex_edges_) + bytes(side_edges_) + bytes(owned_) +
+         bytes(original_) + bytes(blocks_);
 }
 
 void MeshFeatures::findNormals() {
@@ -104,13 +103,13 @@ void MeshFeatures::findNormals() {
 }
 
 void MeshFeatures::findNeighbours() {
-  first_edge_.assign(positions_.size() + 1, 0);
+  first_edge_.assign(mesh_.vertices.size() + 1, 0);
   const std::uint32_t count = edges_.size();
   for (std::uint32_t e = 0; e < count; ++e) {
     ++first_edge_[edges_[e].from + 1];
     ++first_edge_[edges_[e].to + 1];
   }
-  for (std::size_t v = 0; v < positions_.size(); ++v) first_edge_[v + 1] += first_edge_[v];
+  for (std::size_t v = 0; v < mesh_.vertices.size(); ++v) first_edge_[v + 1] += first_edge_[v];
   vertex_edges_.resize(first_edge_.back());
   std::vector<std::uint32_t> next(first_edge_.begin(), first_edge_.end() - 1);
   for (std::uint32_t e = 0; e < count; ++e) {
@@ -140,41 +139,72 @@ void MeshFeatures::findOwned(double greatest_mm) {
     const std::uint32_t owner = edges_.halves(e).front();
     if (!flat[e]) owned_[owner / 3] |= static_cast<std::uint8_t>(1U << owner % 3);
   }
-  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+  for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
     const auto begin = vertex_edges_.begin() + first_edge_[v];
     const auto end = vertex_edges_.begin() + first_edge_[v + 1];
     if (std::all_of(begin, end, [&](std::uint32_t e) { return flat[e]; })) continue;
-    const std::uint32_t owner = triangleOf(Id(Kind::vertex, v));
+    std::uint32_t owner = std::numeric_limits<std::uint32_t>::max();
+    for (auto e = begin; e != end; ++e) owner = std::min(owner, edges_.halves(*e).front() / 3);
     const Mesh::Triangle& t = mesh_.triangles[owner];
     owned_[owner] |=
         static_cast<std::uint8_t>(8U << (std::find(t.begin(), t.end(), v) - t.begin()));
   }
 }
 
-void MeshFeatures::sortByLayer(double layer_mm) {
-  if (mesh_.triangles.empty()) return;
-  double low = std::numeric_limits<double>::infinity();
-  double high = -low;
-  for (const Vec3d& p : positions_) {
-    low = std::min(low, p.z());
-    high = std::max(high, p.z());
+/// The mesh with its triangles in order and its vertices as they first occur in them, so that what
+/// is used together lies together; those that no triangle has are left out.
+Mesh MeshFeatures::sorted(const Mesh& mesh, const Vec3d& origin_mm, double layer_mm,
+                          double row_mm) {
+  Mesh sorted;
+  const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
+  if (count == 0) return sorted;
+  Vec3d low = mesh.vertices.front();
+  Vec3d high = low;
+  for (const Vec3d& p : mesh.vertices) {
+    low = componentMin(low, p);
+    high = componentMax(high, p);
   }
-  const double bin_mm = std::max(layer_mm, (high - low) / 1e6);
-  const auto count = static_cast<std::uint32_t>(mesh_.triangles.size());
+  const double layer_bin_mm = std::max(layer_mm, (high - low).z() / 1e4);
+  const double row_bin_mm = std::max(row_mm, (high - low).y() / 1e2);
+  const auto rows = static_cast<std::uint32_t>((high - low).y() / row_bin_mm) + 1;
+  const auto layers = static_cast<std::uint32_t>((high - low).z() / layer_bin_mm) + 1;
   std::vector<std::uint32_t> bins(count);
-  std::vector<std::uint32_t> first(static_cast<std::size_t>((high - low) / bin_mm) + 2, 0);
+  std::vector<std::uint32_t> first(std::size_t{rows} * layers + 1, 0);
   for (std::uint32_t t = 0; t < count; ++t) {
-    bins[t] = static_cast<std::uint32_t>(std::max(0.0, (extent(t, 2).low - low) / bin_mm));
+    Vec3d corner = mesh.vertices[mesh.triangles[t][0]];
+    for (const std::uint32_t v : mesh.triangles[t]) corner = componentMin(corner, mesh.vertices[v]);
+    bins[t] = static_cast<std::uint32_t>((corner.z() - low.z()) / layer_bin_mm) * rows +
+              static_cast<std::uint32_t>((corner.y() - low.y()) / row_bin_mm);
     ++first[bins[t] + 1];
   }
-  for (std::size_t b = 1; b < first.size(); ++b) first[b] += first[b - 1];
-  order_.resize(count);
-  for (std::uint32_t t = 0; t < count; ++t) order_[first[bins[t]]++] = t;
+  for (std::size_t bin = 1; bin < first.size(); ++bin) first[bin] += first[bin - 1];
+  original_.resize(count);
+  for (std::uint32_t t = 0; t < count; ++t) original_[first[bins[t]]++] = t;
 
-  for (std::size_t begin = 0; begin < order_.size(); begin += block_size) {
-    Extent block = extent(order_[begin], 2);
-    for (std::size_t i = begin; i < std::min(begin + block_size, order_.size()); ++i) {
-      const Extent one = extent(order_[i], 2);
+  constexpr std::uint32_t unseen = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> renumbered(mesh.vertices.size(), unseen);
+  sorted.triangles.reserve(count);
+  sorted.vertices.reserve(mesh.vertices.size());
+  for (const std::uint32_t t : original_) {
+    Mesh::Triangle triangle = mesh.triangles[t];
+    for (std::uint32_t& v : triangle) {
+      if (renumbered[v] == unseen) {
+        renumbered[v] = static_cast<std::uint32_t>(sorted.vertices.size());
+        sorted.vertices.push_back(mesh.vertices[v] - origin_mm);
+      }
+      v = renumbered[v];
+    }
+    sorted.triangles.push_back(triangle);
+  }
+  return sorted;
+}
+
+void MeshFeatures::findBlocks() {
+  const auto count = static_cast<std::uint32_t>(mesh_.triangles.size());
+  for (std::uint32_t begin = 0; begin < count; begin += block_size) {
+    Extent block = extent(begin, 2);
+    for (std::uint32_t t = begin; t < std::min(begin + block_size, count); ++t) {
+      const Extent one = extent(t, 2);
       block = {std::min(block.low, one.low), std::max(block.high, one.high)};
     }
     blocks_.push_back(block);
@@ -183,12 +213,12 @@ void MeshFeatures::sortByLayer(double layer_mm) {
 
 std::vector<std::uint32_t> MeshFeatures::collect(double low, double high) const {
   std::vector<std::uint32_t> found;
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+  const auto count = static_cast<std::uint32_t>(mesh_.triangles.size());
+  for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
     if (blocks_[b].low > high || blocks_[b].high < low) continue;
-    const std::size_t end = std::min((b + 1) * block_size, order_.size());
-    for (std::size_t i = b * block_size; i < end; ++i) {
-      const Extent one = extent(order_[i], 2);
-      if (one.low <= high && one.high >= low) found.push_back(order_[i]);
+    for (std::uint32_t t = b * block_size; t < std::min((b + 1) * block_size, count); ++t) {
+      const Extent one = extent(t, 2);
+      if (one.low <= high && one.high >= low) found.push_back(t);
     }
   }
   return found;
@@ -228,8 +258,8 @@ MeshFeature MeshFeatures::describeFace(std::uint32_t triangle) const {
 
 MeshFeature MeshFeatures::describeEdge(std::uint32_t index) const {
   const MeshEdges::Edge& edge = edges_[index];
-  const Vec3d& a = positions_[edge.from];
-  const Vec3d& b = positions_[edge.to];
+  const Vec3d& a = mesh_.vertices[edge.from];
+  const Vec3d& b = mesh_.vertices[edge.to];
   MeshFeature feature;
   feature.min = componentMin(a, b);
   feature.max = componentMax(a, b);
@@ -281,7 +311,7 @@ MeshFeature MeshFeatures::describeEdge(std::uint32_t index) const {
 }
 
 MeshFeature MeshFeatures::describeVertex(std::uint32_t index) const {
-  const Vec3d& p = positions_[index];
+  const Vec3d& p = mesh_.vertices[index];
   MeshFeature feature;
   feature.min = feature.max = p;
   feature.below = feature.above = Vec3d(1, 1, 1);
@@ -294,7 +324,7 @@ MeshFeature MeshFeatures::describeVertex(std::uint32_t index) const {
   for (std::uint32_t i = first_edge_[index]; i < first_edge_[index + 1]; ++i) {
     if (feature.bounds == MeshFeature::max_bounds) break;
     const MeshEdges::Edge& edge = edges_[vertex_edges_[i]];
-    const Vec3d& other = positions_[edge.from == index ? edge.to : edge.from];
+    const Vec3d& other = mesh_.vertices[edge.from == index ? edge.to : edge.from];
     feature.bound[static_cast<std::size_t>(feature.bounds++)] = halfSpace(p - other, p);
   }
   return feature;
@@ -307,12 +337,12 @@ Vec3d MeshFeatures::away(Id id, const Vec3d& p) const {
       return n * n.dot(p - corner(id.index(), 0));
     }
     case Kind::edge: {
-      const Vec3d& a = positions_[edges_[id.index()].from];
-      const Vec3d along = positions_[edges_[id.index()].to] - a;
+      const Vec3d& a = mesh_.vertices[edges_[id.index()].from];
+      const Vec3d along = mesh_.vertices[edges_[id.index()].to] - a;
       return p - a - along * (along.dot(p - a) / along.lengthSqr());
     }
     case Kind::vertex:
-      return p - positions_[id.index()];
+      return p - mesh_.vertices[id.index()];
   }
   return {0, 0, 0};
 }
@@ -339,10 +369,17 @@ std::vector<Vec3d> MeshFeatures::leastNormals() const {
 
 std::uint32_t MeshFeatures::triangleOf(Id id) const {
   if (id.kind() == Kind::face) return id.index();
-  if (id.kind() == Kind::edge) return edges_.halves(id.index()).front() / 3;
   std::uint32_t lowest = std::numeric_limits<std::uint32_t>::max();
-  for (std::uint32_t i = first_edge_[id.index()]; i < first_edge_[id.index() + 1]; ++i)
-    lowest = std::min(lowest, edges_.halves(vertex_edges_[i]).front() / 3);
+  const auto look = [&](std::uint32_t edge) {
+    for (const std::uint32_t half : edges_.halves(edge))
+      if (lowest > original_.size() || original_[half / 3] < original_[lowest]) lowest = half / 3;
+  };
+  if (id.kind() == Kind::edge) {
+    look(id.index());
+  } else {
+    for (std::uint32_t i = first_edge_[id.index()]; i < first_edge_[id.index() + 1]; ++i)
+      look(vertex_edges_[i]);
+  }
   return lowest;
 }
 

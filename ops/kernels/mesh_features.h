@@ -40,8 +40,8 @@ struct MeshFeature {
       above;  ///< the region within distance b lies from min − b·below to max + b·above
 };
 
-/// The triangles of a mesh in rising order of their lowest layer, and the faces, edges and vertices
-/// that each answers for: every edge and vertex belongs to the lowest of its triangles.
+/// The triangles of a mesh in rising order of their lowest layer, then row, and the faces, edges
+/// and vertices that each answers for: every edge and vertex belongs to the first of its triangles.
 ///
 /// Any set of triangles will do. Where triangles share vertices the regions of neighbours hardly
 /// overlap, so that the work of a distance field follows its voxels instead of its triangles.
@@ -65,23 +65,24 @@ class MeshFeatures {
     double low, high;
   };
 
-  /// `mesh` in mm, kept by reference; positions are taken relative to `origin_mm`. `layer_mm` is
-  /// the height of the bins that the order is made by. Distances above `greatest_mm` are not asked
-  /// for.
-  MeshFeatures(const Mesh& mesh, const openvdb::Vec3d& origin_mm, double layer_mm,
+  /// `mesh` in mm, of which a sorted copy is kept; positions are taken relative to `origin_mm`.
+  /// `layer_mm` and `row_mm` are the sizes of the bins along z and y that the order is made by.
+  /// Distances above `greatest_mm` are not asked for.
+  MeshFeatures(const Mesh& mesh, const openvdb::Vec3d& origin_mm, double layer_mm, double row_mm,
                double greatest_mm);
 
   [[nodiscard]] double memoryBytes() const;
 
-  /// The triangles that meet the layers [low, high] mm, in order.
+  /// The triangles that meet the layers [low, high] mm, in order. A triangle's number is its place
+  /// in the order.
   [[nodiscard]] std::vector<std::uint32_t> collect(double low, double high) const;
 
   /// What a triangle takes along an axis.
   [[nodiscard]] Extent extent(std::uint32_t triangle, int axis) const {
     const Mesh::Triangle& t = mesh_.triangles[triangle];
-    const double a = positions_[t[0]][axis];
-    const double b = positions_[t[1]][axis];
-    const double c = positions_[t[2]][axis];
+    const double a = mesh_.vertices[t[0]][axis];
+    const double b = mesh_.vertices[t[1]][axis];
+    const double c = mesh_.vertices[t[2]][axis];
     return {std::min(std::min(a, b), c), std::max(std::max(a, b), c)};
   }
 
@@ -101,8 +102,8 @@ class MeshFeatures {
   [[nodiscard]] bool meets(Id id, const openvdb::Vec3d& low, const openvdb::Vec3d& high) const {
     if (id.kind() == Kind::face) return true;
     const bool edge = id.kind() == Kind::edge;
-    const openvdb::Vec3d& a = positions_[edge ? edges_[id.index()].from : id.index()];
-    const openvdb::Vec3d& b = positions_[edge ? edges_[id.index()].to : id.index()];
+    const openvdb::Vec3d& a = mesh_.vertices[edge ? edges_[id.index()].from : id.index()];
+    const openvdb::Vec3d& b = mesh_.vertices[edge ? edges_[id.index()].to : id.index()];
     return std::min(a.z(), b.z()) <= high.z() && std::max(a.z(), b.z()) >= low.z() &&
            std::min(a.y(), b.y()) <= high.y() && std::max(a.y(), b.y()) >= low.y();
   }
@@ -114,7 +115,7 @@ class MeshFeatures {
 
   /// Corner `corner` of a triangle, relative to the origin.
   [[nodiscard]] const openvdb::Vec3d& corner(std::uint32_t triangle, int corner) const {
-    return positions_[mesh_.triangles[triangle][static_cast<std::size_t>(corner)]];
+    return mesh_.vertices[mesh_.triangles[triangle][static_cast<std::size_t>(corner)]];
   }
   /// Unit normal, counter-clockwise; zero for a face without area.
   [[nodiscard]] const openvdb::Vec3d& normal(std::uint32_t triangle) const {
@@ -125,29 +126,32 @@ class MeshFeatures {
   /// come to at least.
   [[nodiscard]] std::vector<openvdb::Vec3d> leastNormals() const;
 
-  /// The lowest triangle that the feature belongs to.
+  /// The number that a triangle has in the mesh that was given.
+  [[nodiscard]] std::uint32_t original(std::uint32_t triangle) const { return original_[triangle]; }
+
+  /// Of the triangles that the feature belongs to the one that comes first in the mesh given.
   [[nodiscard]] std::uint32_t triangleOf(Id id) const;
 
  private:
+  Mesh sorted(const Mesh& mesh, const openvdb::Vec3d& origin_mm, double layer_mm, double row_mm);
   void findNormals();
   void findNeighbours();
   void findOwned(double greatest_mm);
-  void sortByLayer(double layer_mm);
+  void findBlocks();
 
   [[nodiscard]] bool isFlat(std::uint32_t edge, double greatest_mm) const;
   [[nodiscard]] MeshFeature describeFace(std::uint32_t triangle) const;
   [[nodiscard]] MeshFeature describeEdge(std::uint32_t index) const;
   [[nodiscard]] MeshFeature describeVertex(std::uint32_t index) const;
 
-  const Mesh& mesh_;
-  std::vector<openvdb::Vec3d> positions_;
+  std::vector<std::uint32_t> original_;  ///< by triangle
+  Mesh mesh_;
   std::vector<openvdb::Vec3d> normals_;
   MeshEdges edges_;
   std::vector<std::uint32_t> first_edge_;  ///< by vertex, and the end of the last
   std::vector<std::uint32_t> vertex_edges_;
   std::vector<std::uint32_t> side_edges_;  ///< by half-edge
   std::vector<std::uint8_t> owned_;        ///< by triangle: bits of its sides, then of its corners
-  std::vector<std::uint32_t> order_;       ///< triangles
   std::vector<Extent> blocks_;             ///< of every `block_size` triangles in order
 };
 

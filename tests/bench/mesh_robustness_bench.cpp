@@ -49,7 +49,7 @@ void judge(const std::filesystem::path& path, int samples) {
   const Lattice lattice{
       pitch, Vec3d(0, 0, 0),
       CoordBBox(Coord(-2), Coord::ceil(bounds.extents() * scale / pitch).offsetBy(2))};
-  const DistanceGrids grids = MeshDistance(solid, lattice, Band{}).run(lattice.layers());
+  const DistanceGrids grids = MeshDistance(*solid, lattice, Band{}).run(lattice.layers());
   const auto surface = grids.surface->getConstAccessor();
 
   std::mt19937 random(1);

@@ -85,8 +85,7 @@ Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm, const Vec3d& orig
 
 DistanceGrids distances(const Mesh& mesh, const Lattice& lattice, double band_mm,
                         DistanceExtras extras = {}) {
-  return MeshDistance(std::make_shared<Mesh>(mesh), lattice, Band{0, band_mm}, extras)
-      .run(lattice.layers());
+  return MeshDistance(mesh, lattice, Band{0, band_mm}, extras).run(lattice.layers());
 }
 
 const Vec3d mimaki(0.042, 0.084, 0.022);
@@ -257,7 +256,7 @@ TEST(MeshDistance, SlabsOfAnyHeightGiveTheWhole) {
   const Mesh mesh = transformed(torusMesh({0, 0, 0}, 0.8, 0.3, 30), {20, 30, 0}, {0.3, 0, 0});
   const Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);
   for (const Band band : {Band{}, Band{0, 0.12}}) {
-    const MeshDistance field(std::make_shared<Mesh>(mesh), lattice, band);
+    const MeshDistance field(mesh, lattice, band);
     const DistanceGrids whole = field.run(lattice.layers());
     for (const int height : {8, 16, 40}) {
       std::vector<Layers> pieces;
@@ -299,11 +298,10 @@ double diameterAlong(const Vec3d& n, const Vec3d& pitch_mm) {
 /// voxel.
 void expectBandForDithering(const Mesh& mesh, const Vec3d& pitch_mm) {
   const Lattice lattice = latticeAround(mesh, pitch_mm, {0, 0, 0}, 8);
-  const auto shared = std::make_shared<Mesh>(mesh);
   const DistanceGrids wide =
-      MeshDistance(shared, lattice, Band{0, 2.5 * pitch_mm.length()}, {true, false})
+      MeshDistance(mesh, lattice, Band{0, 2.5 * pitch_mm.length()}, {true, false})
           .run(lattice.layers());
-  const DistanceGrids band = MeshDistance(shared, lattice, Band{}).run(lattice.layers());
+  const DistanceGrids band = MeshDistance(mesh, lattice, Band{}).run(lattice.layers());
   EXPECT_LT(band.surface->activeVoxelCount(), wide.surface->activeVoxelCount() / 2);
   const openvdb::FloatTree& exact = wide.surface->tree();
   const openvdb::FloatTree& kept = band.surface->tree();
