@@ -103,9 +103,9 @@ class MeshToSdf : public Source {
     schema.lattice = latticeAround(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
     planParts(mesh, lattice);
-    repair(mesh);
+    const SwallowedWalls walls = repair(mesh);
     schema.leaves_per_row = leavesPerRow(mesh, lattice);
-    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_);
+    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, walls);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
@@ -155,7 +155,8 @@ class MeshToSdf : public Source {
     return diameters ? Band{size, 0} : Band{0, size};
   }
 
-  void repair(Mesh& mesh) const {
+  /// Makes the mesh bound a solid and finds what of it is no surface of that.
+  SwallowedWalls repair(Mesh& mesh) const {
     MeshRepairs repairs;
     mesh = repaired(std::move(mesh), repairs);
     if (mesh.triangles.empty())
@@ -165,6 +166,9 @@ class MeshToSdf : public Source {
       throw DataError("the triangles enclose nothing: " + std::to_string(repairs.boundary_edges) +
                       " of their " + std::to_string(sides) +
                       " sides meet no other; join them in a mesh editor first");
+    SwallowedWalls walls = swallowedWalls(mesh);
+    repairs.swallowed_triangles = walls.swallowed;
+    repairs.cut_triangles = walls.cut;
     const std::vector<std::string> lines = repairs.lines();
     if (strict_ && !lines.empty())
       throw DataError("the mesh needs repair, which --strict forbids: " + lines.front() +
@@ -177,6 +181,9 @@ class MeshToSdf : public Source {
     report().count("turned_parts", static_cast<double>(repairs.turned_parts));
     report().count("boundary_edges", static_cast<double>(repairs.boundary_edges));
     report().count("closed_holes", static_cast<double>(repairs.closed_holes));
+    report().count("swallowed_triangles", static_cast<double>(repairs.swallowed_triangles));
+    report().count("cut_triangles", static_cast<double>(repairs.cut_triangles));
+    return walls;
   }
 
   Mesh readMeshes() {
@@ -197,7 +204,8 @@ class MeshToSdf : public Source {
       const auto begin = all.triangles.begin() + static_cast<std::ptrdiff_t>(first);
       part.triangles.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
       MeshRepairs repairs;
-      parts_.emplace_back(repaired(std::move(part), repairs), lattice, band_);
+      part = repaired(std::move(part), repairs);
+      parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
       first += count;
     }
   }

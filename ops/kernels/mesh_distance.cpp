@@ -251,7 +251,8 @@ MeshDistance::Block::Made MeshDistance::Block::make(std::span<const std::uint32_
   work_.bands_mm.clear();
   if (!(field_.band_.mm > 0)) {
     work_.bands_mm.resize(work_.distances.slots(), 0);
-    for (const std::uint32_t triangle : triangles) markBand(triangle);
+    for (const std::uint32_t triangle : triangles)
+      if (all_.hasFeatures(triangle)) markBand(triangle);
   }
   for (const std::uint32_t triangle : triangles) enter(triangle);
   return sweep();
@@ -312,9 +313,12 @@ void MeshDistance::Block::enter(std::uint32_t triangle) {
   // Rows begin before the block: what lies there counts.
   for (const int axis : {2, 1})
     if (low[axis] > high_mm_[axis] || high[axis] < low_mm_[axis]) return;
-  visitRowCrossings({a, b, c}, pitch_mm_, voxels_, [&](const Coord& ijk, int delta) {
-    work_.distances.note(work_.distances.slot(ijk >> 3), RowWinding::pack(ijk, delta));
-  });
+  if (all_.bounds(triangle)) {
+    visitRowCrossings({a, b, c}, pitch_mm_, voxels_, [&](const Coord& ijk, int delta) {
+      work_.distances.note(work_.distances.slot(ijk >> 3), RowWinding::pack(ijk, delta));
+    });
+  }
+  if (!all_.hasFeatures(triangle)) return;
   const CoordBBox reach = reachOf(low - greatest_mm_, high + greatest_mm_);
   if (reach.empty()) return;
   double band_mm = greatest_mm_;
@@ -486,11 +490,11 @@ double bandAcross(const Vec3d& least, const Vec3d& pitch_mm) {
 }  // namespace
 
 MeshDistance::MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band,
-                           DistanceExtras extras)
+                           DistanceExtras extras, const SwallowedWalls& walls)
     : lattice_(lattice),
       band_(band),
       extras_(extras),
-      features_(mesh, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers,
+      features_(mesh, walls, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers,
                 lattice.pitch_mm.y() * leaf_layers * block_rows,
                 band.greatestMm(lattice.pitch_mm)) {
   if (band_.mm > 0) return;

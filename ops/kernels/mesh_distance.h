@@ -63,8 +63,10 @@ class MeshDistance {
  public:
   static constexpr int chunk_layers = LeafDistances::depth * leaf_layers;
 
-  /// `mesh` in mm, not used after this. Positions are those of the lattice.
-  MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band, DistanceExtras extras = {});
+  /// `mesh` in mm, not used after this; no distance is measured to what `walls` hides of it.
+  /// Positions are those of the lattice.
+  MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band, DistanceExtras extras = {},
+               const SwallowedWalls& walls = {});
 
   /// The layers of `core`, clipped to the lattice's box. Const, in any order, from many threads at
   /// once.

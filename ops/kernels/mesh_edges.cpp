@@ -21,11 +21,12 @@ void sortFew(std::uint64_t* begin, std::uint64_t* end) {
 
 }  // namespace
 
-MeshEdges::MeshEdges(const Mesh& mesh) {
+MeshEdges::MeshEdges(const Mesh& mesh, std::size_t triangles) {
   // By the lower end of a side: its other end and its half-edge, to sort by both.
-  const auto forEachSide = [&mesh](const auto& work) {
+  const std::span some(mesh.triangles.data(), triangles);
+  const auto forEachSide = [&some](const auto& work) {
     std::uint64_t half = 0;
-    for (const Mesh::Triangle& t : mesh.triangles)
+    for (const Mesh::Triangle& t : some)
       for (std::size_t side = 0; side < 3; ++side, ++half) {
         const auto [from, to] = std::minmax(t[side], t[side < 2 ? side + 1 : 0]);
         if (from != to) work(from, std::uint64_t{to} << 32 | half);

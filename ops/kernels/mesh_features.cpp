@@ -76,9 +76,9 @@ Vec3d componentMax(const Vec3d& a, const Vec3d& b) { return openvdb::math::maxCo
 
 }  // namespace
 
-MeshFeatures::MeshFeatures(const Mesh& mesh, const Vec3d& origin_mm, double layer_mm, double row_mm,
-                           double greatest_mm)
-    : mesh_(sorted(mesh, origin_mm, layer_mm, row_mm)), edges_(mesh_) {
+MeshFeatures::MeshFeatures(const Mesh& mesh, const SwallowedWalls& walls, const Vec3d& origin_mm,
+                           double layer_mm, double row_mm, double greatest_mm)
+    : mesh_(sorted(mesh, walls, origin_mm, layer_mm, row_mm)), edges_(mesh_, features_) {
   findNormals();
   findNeighbours();
   findOwned(greatest_mm);
@@ -142,6 +142,7 @@ void MeshFeatures::findOwned(double greatest_mm) {
   for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
     const auto begin = vertex_edges_.begin() + first_edge_[v];
     const auto end = vertex_edges_.begin() + first_edge_[v + 1];
+    // Also where there is none: at vertices of hidden triangles alone.
     if (std::all_of(begin, end, [&](std::uint32_t e) { return flat[e]; })) continue;
     std::uint32_t owner = std::numeric_limits<std::uint32_t>::max();
     for (auto e = begin; e != end; ++e) owner = std::min(owner, edges_.halves(*e).front() / 3);
@@ -153,11 +154,22 @@ void MeshFeatures::findOwned(double greatest_mm) {
 
 /// The mesh with its triangles in order and its vertices as they first occur in them, so that what
 /// is used together lies together; those that no triangle has are left out.
-Mesh MeshFeatures::sorted(const Mesh& mesh, const Vec3d& origin_mm, double layer_mm,
-                          double row_mm) {
+Mesh MeshFeatures::sorted(const Mesh& mesh, const SwallowedWalls& walls, const Vec3d& origin_mm,
+                          double layer_mm, double row_mm) {
   Mesh sorted;
-  const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
-  if (count == 0) return sorted;
+  const auto given = static_cast<std::uint32_t>(mesh.triangles.size());
+  const auto count = given + static_cast<std::uint32_t>(walls.pieces.triangles.size());
+  if (given == 0) return sorted;
+  const auto first_piece = static_cast<std::uint32_t>(mesh.vertices.size());
+  const auto triangleAt = [&](std::uint32_t t) {
+    if (t < given) return mesh.triangles[t];
+    Mesh::Triangle piece = walls.pieces.triangles[t - given];
+    for (std::uint32_t& v : piece) v += first_piece;
+    return piece;
+  };
+  const auto vertexAt = [&](std::uint32_t v) -> const Vec3d& {
+    return v < first_piece ? mesh.vertices[v] : walls.pieces.vertices[v - first_piece];
+  };
   Vec3d low = mesh.vertices.front();
   Vec3d high = low;
   for (const Vec3d& p : mesh.vertices) {
@@ -168,29 +180,43 @@ Mesh MeshFeatures::sorted(const Mesh& mesh, const Vec3d& origin_mm, double layer
   const double row_bin_mm = std::max(row_mm, (high - low).y() / 1e2);
   const auto rows = static_cast<std::uint32_t>((high - low).y() / row_bin_mm) + 1;
   const auto layers = static_cast<std::uint32_t>((high - low).z() / layer_bin_mm) + 1;
+  const std::uint32_t group = rows * layers;  // whole triangles, pieces, hidden triangles
   std::vector<std::uint32_t> bins(count);
-  std::vector<std::uint32_t> first(std::size_t{rows} * layers + 1, 0);
+  std::vector<std::uint32_t> first(std::size_t{3} * group + 1, 0);
   for (std::uint32_t t = 0; t < count; ++t) {
-    Vec3d corner = mesh.vertices[mesh.triangles[t][0]];
-    for (const std::uint32_t v : mesh.triangles[t]) corner = componentMin(corner, mesh.vertices[v]);
-    bins[t] = static_cast<std::uint32_t>((corner.z() - low.z()) / layer_bin_mm) * rows +
-              static_cast<std::uint32_t>((corner.y() - low.y()) / row_bin_mm);
+    const Mesh::Triangle triangle = triangleAt(t);
+    const Vec3d corner = componentMin(componentMin(vertexAt(triangle[0]), vertexAt(triangle[1])),
+                                      vertexAt(triangle[2]));
+    const auto binOf = [](double along, double bin_mm, std::uint32_t end) {
+      return std::min(static_cast<std::uint32_t>(std::max(0.0, along / bin_mm)), end - 1);
+    };
+    bins[t] = binOf(corner.z() - low.z(), layer_bin_mm, layers) * rows +
+              binOf(corner.y() - low.y(), row_bin_mm, rows);
+    if (t >= given) {
+      bins[t] += group;
+    } else if (!walls.hidden.empty() && walls.hidden[t]) {
+      bins[t] += 2 * group;
+    }
     ++first[bins[t] + 1];
   }
   for (std::size_t bin = 1; bin < first.size(); ++bin) first[bin] += first[bin - 1];
-  original_.resize(count);
-  for (std::uint32_t t = 0; t < count; ++t) original_[first[bins[t]]++] = t;
+  whole_ = first[group];
+  features_ = first[std::size_t{2} * group];
+  std::vector<std::uint32_t> order(count);
+  for (std::uint32_t t = 0; t < count; ++t) order[first[bins[t]]++] = t;
 
   constexpr std::uint32_t unseen = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> renumbered(mesh.vertices.size(), unseen);
+  std::vector<std::uint32_t> renumbered(first_piece + walls.pieces.vertices.size(), unseen);
   sorted.triangles.reserve(count);
-  sorted.vertices.reserve(mesh.vertices.size());
-  for (const std::uint32_t t : original_) {
-    Mesh::Triangle triangle = mesh.triangles[t];
+  sorted.vertices.reserve(renumbered.size());
+  original_.reserve(count);
+  for (const std::uint32_t t : order) {
+    original_.push_back(t < given ? t : walls.piece_of[t - given]);
+    Mesh::Triangle triangle = triangleAt(t);
     for (std::uint32_t& v : triangle) {
       if (renumbered[v] == unseen) {
         renumbered[v] = static_cast<std::uint32_t>(sorted.vertices.size());
-        sorted.vertices.push_back(mesh.vertices[v] - origin_mm);
+        sorted.vertices.push_back(vertexAt(v) - origin_mm);
       }
       v = renumbered[v];
     }

@@ -8,6 +8,7 @@
 #include <openvdb/math/Vec3.h>
 
 #include "ops/kernels/mesh_edges.h"
+#include "ops/kernels/swallowed_walls.h"
 #include "vdbdither/mesh.h"
 
 namespace vdbdither {
@@ -67,15 +68,23 @@ class MeshFeatures {
 
   /// `mesh` in mm, of which a sorted copy is kept; positions are taken relative to `origin_mm`.
   /// `layer_mm` and `row_mm` are the sizes of the bins along z and y that the order is made by.
-  /// Distances above `greatest_mm` are not asked for.
-  MeshFeatures(const Mesh& mesh, const openvdb::Vec3d& origin_mm, double layer_mm, double row_mm,
-               double greatest_mm);
+  /// Distances above `greatest_mm` are not asked for. Triangles that `walls` hides have no
+  /// features, the pieces that are left of them have.
+  MeshFeatures(const Mesh& mesh, const SwallowedWalls& walls, const openvdb::Vec3d& origin_mm,
+               double layer_mm, double row_mm, double greatest_mm);
 
   [[nodiscard]] double memoryBytes() const;
 
   /// The triangles that meet the layers [low, high] mm, in order. A triangle's number is its place
   /// in the order.
   [[nodiscard]] std::vector<std::uint32_t> collect(double low, double high) const;
+
+  /// Whether rows that cross the triangle enter or leave the solid; not for pieces.
+  [[nodiscard]] bool bounds(std::uint32_t triangle) const {
+    return triangle < whole_ || triangle >= features_;
+  }
+  /// Whether distances are measured to the triangle.
+  [[nodiscard]] bool hasFeatures(std::uint32_t triangle) const { return triangle < features_; }
 
   /// What a triangle takes along an axis.
   [[nodiscard]] Extent extent(std::uint32_t triangle, int axis) const {
@@ -133,7 +142,8 @@ class MeshFeatures {
   [[nodiscard]] std::uint32_t triangleOf(Id id) const;
 
  private:
-  Mesh sorted(const Mesh& mesh, const openvdb::Vec3d& origin_mm, double layer_mm, double row_mm);
+  Mesh sorted(const Mesh& mesh, const SwallowedWalls& walls, const openvdb::Vec3d& origin_mm,
+              double layer_mm, double row_mm);
   void findNormals();
   void findNeighbours();
   void findOwned(double greatest_mm);
@@ -144,6 +154,9 @@ class MeshFeatures {
   [[nodiscard]] MeshFeature describeEdge(std::uint32_t index) const;
   [[nodiscard]] MeshFeature describeVertex(std::uint32_t index) const;
 
+  // Whole triangles come first, then pieces, then hidden triangles.
+  std::uint32_t whole_ = 0;              ///< end of the first
+  std::uint32_t features_ = 0;           ///< and of the second
   std::vector<std::uint32_t> original_;  ///< by triangle
   Mesh mesh_;
   std::vector<openvdb::Vec3d> normals_;

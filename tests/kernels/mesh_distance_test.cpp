@@ -10,6 +10,7 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/global_control.h>
 
+#include "ops/kernels/winding_number.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/layers.h"
 
@@ -60,20 +61,6 @@ Nearest bruteForce(const Mesh& mesh, const Vec3d& p) {
   return best;
 }
 
-/// Generalized winding number (van Oosterom and Strackee's solid angles).
-double windingNumber(const Mesh& mesh, const Vec3d& p) {
-  double sum = 0;
-  for (const Mesh::Triangle& t : mesh.triangles) {
-    const Vec3d a = mesh.vertices[t[0]] - p;
-    const Vec3d b = mesh.vertices[t[1]] - p;
-    const Vec3d c = mesh.vertices[t[2]] - p;
-    const double la = a.length(), lb = b.length(), lc = c.length();
-    sum += 2 * std::atan2(a.dot(b.cross(c)),
-                          la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return sum / (4 * std::numbers::pi);
-}
-
 Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm, const Vec3d& origin_mm, int margin) {
   openvdb::math::BBox<Vec3d> bounds;
   for (const Vec3d& v : mesh.vertices) bounds.expand(v);
@@ -97,6 +84,7 @@ void expectExact(const Mesh& mesh, const Lattice& lattice, double band_mm, bool 
   const DistanceGrids grids = distances(mesh, lattice, band_mm);
   const openvdb::FloatGrid::ConstAccessor surface = grids.surface->getConstAccessor();
   const auto background = static_cast<float>(band_mm);
+  const WindingNumber winding(mesh);
   std::mt19937 random(7);
   int active = 0;
   int wrong = 0;
@@ -121,7 +109,7 @@ void expectExact(const Mesh& mesh, const Lattice& lattice, double band_mm, bool 
         ++wrong, ADD_FAILURE() << ijk << " is inactive with " << value;
     }
     if (closed && exact > 1e-6 && (!on || random() % 4 == 0)) {
-      const bool inside = std::abs(windingNumber(mesh, p)) > 0.5;
+      const bool inside = std::abs(winding.exactAt(p)) > 0.5;
       if (inside != (value < 0)) ++wrong, ADD_FAILURE() << ijk << " has the wrong sign: " << value;
     }
   }
