@@ -129,14 +129,6 @@ class RowWinding {
   std::uint64_t bits_ = 0;                  ///< those that are not zero
 };
 
-openvdb::math::Transform::Ptr transformOf(const Lattice& lattice) {
-  using namespace openvdb::math;
-  if (lattice.origin_mm == Vec3d(0, 0, 0))
-    return std::make_shared<Transform>(std::make_shared<ScaleMap>(lattice.pitch_mm));
-  return std::make_shared<Transform>(
-      std::make_shared<ScaleTranslateMap>(lattice.pitch_mm, lattice.origin_mm));
-}
-
 template <class Tree>
 typename Tree::LeafNodeType* newLeaf(const Coord& origin, const typename Tree::ValueType& value) {
   auto* leaf = new typename Tree::LeafNodeType(openvdb::PartialCreate(), origin, value, false);
