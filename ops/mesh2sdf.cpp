@@ -182,8 +182,9 @@ class MeshToSdf : public Source {
 
   /// Warns of a part that is hardly meant to be as large or as small as it is.
   void questionSize(const Mesh& mesh) const {
-    constexpr double largest_mm = 3000;
-    constexpr double least_mm = 0.1;
+    // 3 m and 0.1 mm, as far as floats of a file tell.
+    constexpr double largest_mm = 3000 * (1 - 1e-6);
+    constexpr double least_mm = 0.1 * (1 + 1e-6);
     const MeshBounds bounds = boundsOf(mesh);
     const Vec3d size_mm = bounds.max - bounds.min;
     const double longest_mm = std::max({size_mm.x(), size_mm.y(), size_mm.z()});
