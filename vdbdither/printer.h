@@ -20,8 +20,8 @@ struct PrinterProfile {
   std::string name;    ///< as written after --printer: mimaki-3duj-553
   std::string title;   ///< as people call it
   std::string source;  ///< where these figures were taken from
-  openvdb::Vec3d pitch_mm{
-      0.0};  ///< voxel size across the carriage (x), along it (y), and the layer (z)
+  /// Voxel size across the carriage (x), along it (y), and the layer (z).
+  openvdb::Vec3d pitch_mm{0.0};
   openvdb::Vec3d build_mm{0.0};  ///< usable volume; zero where unknown
   std::vector<Material>
       materials;  ///< model materials first to last; support is the printer's own affair
