@@ -8,6 +8,8 @@
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <unistd.h>
+#include <vector>
 
 #include <openvdb/io/Stream.h>
 #include <openvdb/tools/ChangeBackground.h>
@@ -303,6 +305,19 @@ VdbContents readVdb(const std::filesystem::path& path) {
     throw DataError(quoted(path) + " is damaged: its checksum does not match; make it again");
   }
   return readStream(file, quoted(path));
+}
+
+VdbContents readVdbPipe(int descriptor, const std::string& where) {
+  std::string bytes;
+  std::vector<char> buffer(1 << 20);
+  for (;;) {
+    const ssize_t size = ::read(descriptor, buffer.data(), buffer.size());
+    if (size < 0 && errno == EINTR) continue;
+    if (size < 0) throw DataError("cannot read " + where + ": " + std::strerror(errno));
+    if (size == 0) break;
+    bytes.append(buffer.data(), static_cast<std::size_t>(size));
+  }
+  return contentsOfBytes(bytes, where);
 }
 
 GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name) {

@@ -4,6 +4,8 @@
 
 #include "io/mesh_reader.h"
 #include "io/printer_profile.h"
+#include "io/target_lattice.h"
+#include "ops/kernels/held_band.h"
 #include "ops/kernels/mesh_distance.h"
 #include "ops/kernels/mesh_placement.h"
 #include "ops/kernels/mesh_repair.h"
@@ -61,11 +63,12 @@ class MeshToSdf : public Source {
 
   Schema plan() override {
     Schema schema;
-    const Vec3d pitch_mm = pitchMm(schema);
+    const Vec3d pitch_mm = targetPitchMm(printer_, pitch_, schema);
     band_ = bandFrom(band_text_);
+    held_band_mm_ = band_.leastMm(pitch_mm);
     Mesh mesh = readMeshes();
     place(mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
-    questionSize(mesh);
+    questionSize(mesh, schema);
     schema.lattice = latticeAround(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
     planParts(mesh, lattice);
@@ -94,30 +97,6 @@ class MeshToSdf : public Source {
   }
 
  private:
-  Vec3d pitchMm(Schema& schema) {
-    if (printer_.empty() == pitch_.empty())
-      throw UsageError(
-          "give either --printer NAME (vdbdither printers lists them) or --pitch DX,DY,DZ");
-    if (!printer_.empty()) {
-      const PrinterProfile profile = readPrinterProfile(printer_);
-      schema.metadata["vdbdither:printer"] = toJson(profile);
-      build_mm_ = profile.build_mm;
-      return profile.pitch_mm;
-    }
-    Vec3d pitch_mm;
-    std::size_t begin = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::size_t comma = pitch_.find(',', begin);
-      if ((comma == std::string::npos) != (axis == 2))
-        throw UsageError("--pitch: '" + pitch_ + "' is not three lengths such as 42um,84um,22um");
-      pitch_mm[axis] = parseLengthMm(std::string_view(pitch_).substr(begin, comma - begin));
-      if (!(pitch_mm[axis] >= 1e-3 && pitch_mm[axis] <= 10))
-        throw UsageError("--pitch: '" + pitch_ + "' is not between 1 um and 10 mm in every axis");
-      begin = comma + 1;
-    }
-    return pitch_mm;
-  }
-
   static Band bandFrom(const std::string& text) {
     const bool diameters = text.find_first_not_of("0123456789.") == std::string::npos;
     const double size = parseLengthMm(text);
@@ -181,10 +160,14 @@ class MeshToSdf : public Source {
   }
 
   /// Warns of a part that is hardly meant to be as large or as small as it is.
-  void questionSize(const Mesh& mesh) const {
+  void questionSize(const Mesh& mesh, const Schema& schema) const {
     // 3 m and 0.1 mm, as far as floats of a file tell.
     constexpr double largest_mm = 3000 * (1 - 1e-6);
     constexpr double least_mm = 0.1 * (1 + 1e-6);
+    const auto profile = schema.metadata.find("vdbdither:printer");
+    const Vec3d build_mm = profile == schema.metadata.end()
+                               ? Vec3d(0.0)
+                               : printerProfileFromJson(profile->second).build_mm;
     const MeshBounds bounds = boundsOf(mesh);
     const Vec3d size_mm = bounds.max - bounds.min;
     const double longest_mm = std::max({size_mm.x(), size_mm.y(), size_mm.z()});
@@ -193,11 +176,11 @@ class MeshToSdf : public Source {
                            " x " + rounded(size_mm.z()) + " mm";
     if (longest_mm >= largest_mm || (longest_mm > 0 && longest_mm <= least_mm)) {
       report().warn(is + "; " + likelierUnit(longest_mm));
-    } else if (build_mm_ != Vec3d(0, 0, 0) &&
-               (size_mm.x() > build_mm_.x() || size_mm.y() > build_mm_.y() ||
-                size_mm.z() > build_mm_.z())) {
-      report().warn(is + ", more than the " + rounded(build_mm_.x()) + " x " +
-                    rounded(build_mm_.y()) + " x " + rounded(build_mm_.z()) +
+    } else if (build_mm != Vec3d(0, 0, 0) &&
+               (size_mm.x() > build_mm.x() || size_mm.y() > build_mm.y() ||
+                size_mm.z() > build_mm.z())) {
+      report().warn(is + ", more than the " + rounded(build_mm.x()) + " x " +
+                    rounded(build_mm.y()) + " x " + rounded(build_mm.z()) +
                     " mm that the printer builds; turn it with --rotate, or see --unit and --fit");
     }
   }
@@ -222,11 +205,11 @@ class MeshToSdf : public Source {
            shortestText(std::round(best_mm * 100) / 100) + " mm";
   }
 
-  /// The voxels within a voxel diagonal of the mesh's bounding box; where y is refined, the same
-  /// region in finer voxels.
+  /// The voxels within a voxel diagonal, or the band, of the mesh's bounding box; where y is
+  /// refined, the same region in finer voxels.
   Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm) const {
     const MeshBounds bounds = boundsOf(mesh);
-    const double margin_mm = pitch_mm.length();
+    const double margin_mm = std::max(pitch_mm.length(), band_.greatestMm(pitch_mm));
     for (int axis = 0; axis < 3; ++axis) {
       const double furthest_mm =
           std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) + margin_mm;
@@ -277,7 +260,8 @@ class MeshToSdf : public Source {
     return leaves;
   }
 
-  static Grids gridsOf(const DistanceGrids& made) {
+  [[nodiscard]] Grids gridsOf(const DistanceGrids& made) const {
+    setHeldBandMm(*made.surface, held_band_mm_);
     Grids grids{{"surface", made.surface}};
     if (made.normals) grids["N"] = made.normals;
     if (made.closest) grids["closest"] = made.closest;
@@ -295,10 +279,10 @@ class MeshToSdf : public Source {
   bool strict_ = false;
   int refine_y_ = 1;
   std::string band_text_ = "1";
-  Vec3d build_mm_{0, 0, 0};  ///< what the printer can print; zero where unknown
   DistanceExtras extras_;
 
   Band band_;
+  double held_band_mm_ = 0;
   std::unique_ptr<MeshDistance> field_;
   std::vector<std::size_t> triangle_counts_;  ///< of every file
   std::vector<MeshDistance> parts_;           ///< of every file, where there are several

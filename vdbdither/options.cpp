@@ -92,8 +92,11 @@ void addTo(CLI::App& app, const Option& option, const std::string& group) {
   }
   added->group(group)->option_text(option.value +
                                    (option.fallback.empty() ? "" : " [" + option.fallback + "]"));
-  if (option.kind == Option::Kind::value)
+  if (option.kind == Option::Kind::value && option.repeated) {
+    added->allow_extra_args(false);
+  } else if (option.kind == Option::Kind::value) {
     added->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+  }
 }
 
 }  // namespace
@@ -160,6 +163,19 @@ void Options::text(std::string name, std::string& target, std::string value, std
   option.fallback = target;
   option.set = [&target](const std::string& text) { target = text; };
   option.get = [&target] { return target; };
+}
+
+void Options::texts(std::string name, std::vector<std::string>& targets, std::string value,
+                    std::string help) {
+  Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
+  option.repeated = true;
+  option.set = [&targets](const std::string& text) { targets.push_back(text); };
+  option.get = [&targets, option_name = option.name] {
+    std::vector<std::string> quoted;
+    std::transform(targets.begin(), targets.end(), std::back_inserter(quoted), quotedForShell);
+    const std::string between = " --" + option_name + " ";
+    return joined(quoted, between.c_str());
+  };
 }
 
 void Options::choice(std::string name, std::string& target, std::vector<std::string> choices,

@@ -23,7 +23,8 @@ struct Option {
   std::string help;      ///< one sentence
   std::string fallback;  ///< canonical text of the default
   bool required = false;
-  bool repeated = false;  ///< a positional that takes every remaining word
+  /// A positional that takes every remaining word, or an option that may be given several times.
+  bool repeated = false;
   std::function<void(const std::string&)>
       set;                           ///< throws UsageError with what would have been accepted
   std::function<std::string()> get;  ///< canonical text of the present value
@@ -34,6 +35,9 @@ class Options {
  public:
   void flag(std::string name, bool& target, std::string help);
   void text(std::string name, std::string& target, std::string value, std::string help);
+  /// An option that may be given again and again.
+  void texts(std::string name, std::vector<std::string>& targets, std::string value,
+             std::string help);
   void choice(std::string name, std::string& target, std::vector<std::string> choices,
               std::string help);
   void integer(std::string name, int& target, int min, int max, std::string help);

@@ -62,6 +62,23 @@ double bytesPerRow(const Schema& schema, const Names& names) {
   return bytes * schema.leaves_per_row;
 }
 
+/// `slab`, of the layers that are `coming`, where a filter wants more of them: at the ends it takes
+/// the empty layers of its outermost leaves along, so that the next slab begins with a leaf.
+Slab widened(Slab slab, ZRange coming, ZRange wanted) {
+  const ZRange core = slab.core;
+  if (core.begin == coming.begin) slab.core.begin = alignedToLeaves(core).begin;
+  if (core.end == coming.end) slab.core.end = alignedToLeaves(core).end;
+  slab.core = intersection(slab.core, wanted);
+  slab.valid = slab.core;
+  if (slab.core == core) return slab;
+  for (auto& [name, grid] : slab.grids) {
+    // A range of leaves never equals that of a whole grid, so that the join cuts what is outside.
+    const Layers piece{grid, {core.begin - leaf_layers, core.end + leaf_layers}};
+    grid = joinLayers({&piece, 1}, core);
+  }
+  return slab;
+}
+
 ZRange parseLayers(const std::string& text, ZRange all) {
   if (text.empty()) return all;
   ZRange range;
@@ -202,7 +219,10 @@ class Pipeline::Stage : public Reporter {
   [[nodiscard]] bool standsAlone() const { return sink() && sink()->standsAlone(); }
 
   Watcher* watcher = nullptr;
-  ZRange cores;     ///< the layers this stage is to give out
+  ZRange cores;   ///< the layers this stage is to give out
+  ZRange coming;  ///< of a filter: what the stage before gives
+  ZRange layers;  ///< and with it the layers of its own that are empty there
+  int next_layer = 0;
   Names handed_on;  ///< the grids that a later stage looks at
   std::optional<Window> window;
   int done_layers = 0;
@@ -333,7 +353,16 @@ void Pipeline::planRanges() {
   ZRange coming = stages_.front()->cores;
   for (const auto& stage : stages_) {
     if (!stage->filter()) continue;
-    stage->window.emplace(stage->reads(), coming, stage->cores);
+    stage->coming = coming;
+    // A box that the filter widens has layers that nobody makes: they are empty.
+    stage->layers = coming;
+    if (!stage->cores.empty()) {
+      stage->layers = coming.empty() ? stage->cores
+                                     : ZRange{std::min(coming.begin, stage->cores.begin),
+                                              std::max(coming.end, stage->cores.end)};
+    }
+    stage->next_layer = stage->layers.begin;
+    stage->window.emplace(stage->reads(), stage->layers, stage->cores);
     coming = stage->cores;
   }
 }
@@ -474,6 +503,9 @@ void Pipeline::run() {
     push(1, {core, core, std::move(grids)});
     begin = core.end;
   }
+  for (std::size_t index = 1; index < stages_.size(); ++index) {
+    if (stages_[index]->filter()) pushEmpty(index, stages_[index]->layers.end);
+  }
   for (const auto& stage : stages_) {
     if (stage->sink()) stage->timed([&] { stage->sink()->finish(); });
   }
@@ -493,6 +525,29 @@ void Pipeline::push(std::size_t index, Slab slab) {
     push(index + 1, std::move(slab));
     return;
   }
+  if (stage.layers != stage.coming) {
+    slab = widened(std::move(slab), stage.coming, stage.layers);
+    pushEmpty(index, slab.core.begin);
+  }
+  take(index, std::move(slab));
+}
+
+/// Hands the filter at `index` layers without voxels up to `end`.
+void Pipeline::pushEmpty(std::size_t index, int end) {
+  Stage& stage = *stages_[index];
+  while (stage.next_layer < end) {
+    const int begin = stage.next_layer;
+    const int cut = begin - ((begin % slab_layers_) + slab_layers_) % slab_layers_ + slab_layers_;
+    const ZRange core{begin, std::min(cut, end)};
+    Grids nothing;
+    stages_[index - 1]->handOn(nothing);
+    take(index, {core, core, std::move(nothing)});
+  }
+}
+
+void Pipeline::take(std::size_t index, Slab slab) {
+  Stage& stage = *stages_[index];
+  stage.next_layer = slab.core.end;
   for (Window::Task& task : stage.window->push(std::move(slab))) {
     Grids made = stage.timed([&] { return stage.filter()->run(task.input); });
     if (options_.json || options_.verbose) stage.countOutput(made);

@@ -73,6 +73,8 @@ class Pipeline {
   void planNeeds();
   void planSlabs();
   void push(std::size_t index, Slab slab);
+  void pushEmpty(std::size_t index, int end);
+  void take(std::size_t index, Slab slab);
   [[nodiscard]] double expectedMemoryBytes(int slab_layers) const;
   [[nodiscard]] double memoryBudgetBytes() const;
   [[nodiscard]] OutputEstimate expectedOutput(const Stage& stage) const;

@@ -1,7 +1,9 @@
 // A Euclidean distance transform by axes (T. Saito, J. Toriwaki, "New algorithms for Euclidean
 // distance transformation of an n-dimensional digitized picture", Pattern Recognition 27, 1994),
 // each pass cut at the greatest depth of interest and done only for leaf-sized blocks that hold
-// voxels: along z from the bits of the leaves, then y, then x.
+// voxels: along z from the bits of the leaves, then y, then x. A pass goes outwards from each plane
+// of a block and ends as soon as no step further can change what comes of it: along x, that is
+// where every voxel of the plane is known to lie in the outermost band.
 
 #include "ops/kernels/depth_bands.h"
 
@@ -41,12 +43,34 @@ bool all(const LeafBits& bits) {
   return std::all_of(bits.begin(), bits.end(), [](std::uint64_t word) { return ~word == 0; });
 }
 
-/// Squared distances of a block's voxels, in the order of a leaf; stored only where they differ.
+/// Squared distances of a block's voxels; stored only where they differ.
 struct Block {
   enum class State { unknown, zero, beyond_reach, mixed };
   State state = State::unknown;
-  std::array<float, volume> squares;
+  std::array<float, volume> squares;  ///< planes along the axis of the next pass
 };
+
+/// The squared distances of a plane while they are lowered.
+using Plane = std::array<float, plane>;
+
+/// to[i] = min(to[i], from[i] + added).
+void lower(Plane& to, const float* from, float added) {
+  Plane lowered;
+  for (std::size_t i = 0; i < to.size(); ++i) lowered[i] = std::min(to[i], from[i] + added);
+  to = lowered;
+}
+void lower(Plane& to, float added) {
+  for (float& square : to) square = std::min(square, added);
+}
+
+float greatest(const Plane& squares) {
+  Plane most = squares;
+  // Halves against each other, so that no lane waits for another.
+  for (std::size_t half = most.size() / 2; half >= 4; half /= 2) {
+    for (std::size_t i = 0; i < half; ++i) most[i] = std::max(most[i], most[i + half]);
+  }
+  return std::max(std::max(most[0], most[1]), std::max(most[2], most[3]));
+}
 
 int leafOrigin(int index) { return index & ~(edge - 1); }
 
@@ -86,14 +110,16 @@ class StripTransform {
       limits_.push_back(static_cast<float>(limit_mm * limit_mm));
     }
     blocks_.resize(x_blocks_ + 2 * static_cast<std::size_t>(blocksWithinReach(0)));
-    along_y_.resize(2 * static_cast<std::size_t>(blocksWithinReach(1)) + 1);
+    rows_.resize(2 * static_cast<std::size_t>(blocksWithinReach(1)) + 1);
+    along_y_.resize(rows_.size());
+    for (Row& row : rows_) row.blocks.resize(blocks_.size());
   }
 
-  /// Adds the blocks at (·, y, z) that hold voxels to `out`.
+  /// Adds the blocks at (·, y, z) that hold voxels to `out`. Cheapest where y rises in one z.
   void run(int y, int z, std::vector<Output>& out) {
     using Branch = BoolTree::RootNodeType::ChildNodeType::ChildNodeType;
     constexpr int branch_edge = static_cast<int>(Branch::DIM);
-    for (Block& block : blocks_) block.state = Block::State::unknown;
+    turnTo(y, z);
     for (int index = 0; index < x_blocks_;) {
       const Coord origin(x_begin_ + index * edge, y, z);
       if (!accessor_.probeConstNode<Branch>(origin) && !accessor_.isValueOn(origin)) {
@@ -110,6 +136,30 @@ class StripTransform {
  private:
   [[nodiscard]] int reach(int axis) const { return static_cast<int>(squares_[axis].size()) - 1; }
   [[nodiscard]] int blocksWithinReach(int axis) const { return (reach(axis) + edge - 1) / edge; }
+
+  /// The blocks at (·, y, z) after the pass along z, made as they are asked for.
+  struct Row {
+    int y = 0;
+    std::vector<Block> blocks;
+  };
+
+  /// Which of the rows, a ring, is that of `y`.
+  [[nodiscard]] Row& row(int y) {
+    const int count = static_cast<int>(rows_.size());
+    return rows_[((y / edge) % count + count) % count];
+  }
+
+  void turnTo(int y, int z) {
+    for (Block& block : blocks_) block.state = Block::State::unknown;
+    const int margin = blocksWithinReach(1);
+    for (int i = -margin; i <= margin; ++i) {
+      Row& kept = row(y + i * edge);
+      if (kept.y == y + i * edge && z == z_) continue;
+      kept.y = y + i * edge;
+      for (Block& block : kept.blocks) block.state = Block::State::unknown;
+    }
+    z_ = z;
+  }
 
   [[nodiscard]] LeafBits bitsAt(const Coord& origin) const {
     LeafBits bits{};
@@ -135,6 +185,11 @@ class StripTransform {
     open.fill(true);
     for (int depth = 0; depth < reach(2); depth += edge) {
       const LeafBits bits = bitsAt(origin.offsetBy(0, 0, above ? edge + depth : -edge - depth));
+      if (all(bits)) {
+        for (int column = 0; column < plane; ++column) count[column] += open[column] ? edge : 0;
+        continue;
+      }
+      if (none(bits)) break;
       bool any_open = false;
       for (int column = 0; column < plane; ++column) {
         if (!open[column]) continue;
@@ -150,17 +205,25 @@ class StripTransform {
   }
 
   /// Along z: to the nearest empty voxel of the column.
-  void passZ(const Coord& origin, Block& block) const {
+  const Block& passZ(int index, const Coord& origin) {
+    Block& block = row(origin.y()).blocks[index + blocksWithinReach(0)];
+    if (block.state != Block::State::unknown) return block;
     const LeafBits bits = bitsAt(origin);
     if (none(bits)) {
       block.state = Block::State::zero;
-      return;
+      return block;
     }
     const std::array<int, plane> below = solidBeyond(origin, false);
     const std::array<int, plane> above = solidBeyond(origin, true);
     block.state = Block::State::beyond_reach;
+    const auto far = [&](int count) { return count >= reach(2); };
+    if (all(bits) && std::all_of(below.begin(), below.end(), far) &&
+        std::all_of(above.begin(), above.end(), far))
+      return block;
     for (int column = 0; column < plane; ++column) {
-      const std::uint64_t byte = bits[column / edge] >> (edge * (column % edge));
+      const int x = column / edge;
+      const int y = column % edge;
+      const std::uint64_t byte = bits[x] >> (edge * y);
       std::array<int, edge> steps;
       int run = below[column];
       for (int z = 0; z < edge; ++z) steps[z] = run = byte >> z & 1 ? run + 1 : 0;
@@ -169,21 +232,37 @@ class StripTransform {
         run = byte >> z & 1 ? run + 1 : 0;
         steps[z] = std::min(steps[z], run);
         const bool within = steps[z] <= reach(2);
-        block.squares[column * edge + z] = within ? squares_[2][steps[z]] : infinite;
+        block.squares[y * plane + x * edge + z] = within ? squares_[2][steps[z]] : infinite;
         if (within) block.state = Block::State::mixed;
       }
     }
+    return block;
   }
 
-  /// to[i] = min(to[i], source[begin + i] + added) for i < count.
-  static void lower(float* to, const Block& source, std::ptrdiff_t begin, std::ptrdiff_t count,
-                    float added) {
-    if (source.state == Block::State::zero) {
-      for (int i = 0; i < count; ++i) to[i] = std::min(to[i], added);
-    } else if (source.state == Block::State::mixed) {
-      const float* from = source.squares.data() + begin;
-      for (int i = 0; i < count; ++i) to[i] = std::min(to[i], from[i] + added);
+  /// The least over the planes of a row of blocks around plane `at`, as far as the reach or until
+  /// nothing above `enough` can get lower.
+  template <typename BlockAt>
+  Plane leastAround(int at, int axis, float enough, const BlockAt& block_at) const {
+    Plane least;
+    least.fill(infinite);
+    const std::vector<float>& added = squares_[axis];
+    const auto take = [&](int from, float square) {
+      const Block& source = block_at(from / edge);
+      if (source.state == Block::State::zero) lower(least, square);
+      if (source.state == Block::State::mixed)
+        lower(least, source.squares.data() + from % edge * plane, square);
+    };
+    take(at, added[0]);
+    for (int step = 1; step <= reach(axis); ++step) {
+      // Every step is worth a look at first, every eighth later.
+      if (step <= 4 || step % edge == 0) {
+        const float most = greatest(least);
+        if (most <= std::max(enough, added[step])) break;
+      }
+      take(at - step, added[step]);
+      take(at + step, added[step]);
     }
+    return least;
   }
 
   /// Along y, from the columns in front and behind. Made once per block.
@@ -193,21 +272,22 @@ class StripTransform {
     const int margin = blocksWithinReach(1);
     bool all_beyond = true;
     for (int i = 0; i <= 2 * margin; ++i) {
-      passZ(origin.offsetBy(0, (i - margin) * edge, 0), along_y_[i]);
-      all_beyond = all_beyond && along_y_[i].state == Block::State::beyond_reach;
+      along_y_[i] = &passZ(index, origin.offsetBy(0, (i - margin) * edge, 0));
+      all_beyond = all_beyond && along_y_[i]->state == Block::State::beyond_reach;
     }
-    if (all_beyond || along_y_[margin].state == Block::State::zero) {
-      block.state = all_beyond ? Block::State::beyond_reach : Block::State::zero;
+    if (along_y_[margin]->state == Block::State::zero) {
+      block.state = Block::State::zero;
       return block;
     }
-    block.state = Block::State::mixed;
-    block.squares.fill(infinite);
-    for (int y = 0; y < edge; ++y) {
-      for (int step = -reach(1); step <= reach(1); ++step) {
-        const int from = y + step + margin * edge;
-        for (int x = 0; x < edge; ++x) {
-          lower(&block.squares[(x * edge + y) * edge], along_y_[from / edge],
-                (x * edge + from % edge) * edge, edge, squares_[1][std::abs(step)]);
+    block.state = Block::State::beyond_reach;
+    for (int y = 0; y < edge && !all_beyond; ++y) {
+      const Plane least =
+          leastAround(y + margin * edge, 1, 0, [&](int i) -> const Block& { return *along_y_[i]; });
+      for (int x = 0; x < edge; ++x) {
+        for (int z = 0; z < edge; ++z) {
+          const float square = least[x * edge + z];
+          if (square <= limits_.back()) block.state = Block::State::mixed;
+          block.squares[(x * edge + y) * edge + z] = square;
         }
       }
     }
@@ -226,11 +306,9 @@ class StripTransform {
     std::array<float, volume> squares;
     squares.fill(infinite);
     for (int x = 0; x < edge && !all_beyond; ++x) {
-      for (int step = -reach(0); step <= reach(0); ++step) {
-        const int from = x + step + margin * edge;
-        lower(&squares[x * plane], blocks_[index + from / edge], from % edge * plane, plane,
-              squares_[0][std::abs(step)]);
-      }
+      const Plane least = leastAround(x + margin * edge, 0, limits_.front(),
+                                      [&](int i) -> const Block& { return blocks_[index + i]; });
+      std::copy(least.begin(), least.end(), squares.begin() + x * plane);
     }
     std::array<std::int32_t, volume> values{};
     for (int i = 0; i < volume; ++i) {
@@ -264,7 +342,9 @@ class StripTransform {
   std::array<std::vector<float>, 3> squares_;  ///< per axis, (i · pitch)² within reach
   std::vector<float> limits_;                  ///< per band, squared
   std::vector<Block> blocks_;                  ///< the row after the pass along y, with margins
-  std::vector<Block> along_y_;                 ///< the columns of blocks that one block needs
+  std::vector<Row> rows_;                      ///< those around it after the pass along z
+  std::vector<const Block*> along_y_;          ///< of those, what one block needs
+  int z_ = 0;
 };
 
 }  // namespace
@@ -282,13 +362,19 @@ openvdb::Int32Grid::Ptr valueByDepth(const openvdb::BoolGrid& solid, const openv
   const int y_begin = leafOrigin(region.min().y());
   const int strips = (region.max().y() - y_begin) / edge + 1;
   const ZRange layers = alignedToLeaves(core);
-  std::vector<std::vector<Output>> outputs(strips);
-  tbb::parallel_for(tbb::blocked_range<int>(0, strips), [&](const tbb::blocked_range<int>& range) {
+  // A piece of work is some strips of one layer of leaves: enough of them that what their margins
+  // share is made once, few enough that threads have something to do.
+  constexpr int strips_per_piece = 16;
+  const int pieces_per_layer = (strips + strips_per_piece - 1) / strips_per_piece;
+  const int pieces = pieces_per_layer * (layers.size() / edge);
+  std::vector<std::vector<Output>> outputs(pieces);
+  tbb::parallel_for(tbb::blocked_range<int>(0, pieces), [&](const tbb::blocked_range<int>& range) {
     StripTransform transform(solid, pitch_mm, region, valid, bands, beneath);
-    for (int strip = range.begin(); strip < range.end(); ++strip) {
-      for (int z = layers.begin; z < layers.end; z += edge) {
-        transform.run(y_begin + strip * edge, z, outputs[strip]);
-      }
+    for (int piece = range.begin(); piece < range.end(); ++piece) {
+      const int z = layers.begin + piece / pieces_per_layer * edge;
+      const int first = piece % pieces_per_layer * strips_per_piece;
+      for (int strip = first; strip < std::min(first + strips_per_piece, strips); ++strip)
+        transform.run(y_begin + strip * edge, z, outputs[piece]);
     }
   });
   for (std::vector<Output>& strip : outputs) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 
 #include "ops/kernels/leaf_distances.h"
@@ -24,6 +25,11 @@ struct Band {
   /// The largest that it comes to on a lattice of this pitch.
   [[nodiscard]] double greatestMm(const openvdb::Vec3d& pitch_mm) const {
     return mm > 0 ? mm : diameters * pitch_mm.length();
+  }
+
+  /// The smallest: distances up to it are kept everywhere.
+  [[nodiscard]] double leastMm(const openvdb::Vec3d& pitch_mm) const {
+    return mm > 0 ? mm : diameters * std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
   }
 };
 

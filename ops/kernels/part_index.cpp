@@ -62,6 +62,8 @@ void fillLeaf(Leaf& leaf, std::vector<Accessor>& surfaces) {
 openvdb::Int32Grid::Ptr partIndex(std::span<const FloatGrid::ConstPtr> surfaces) {
   auto grid = openvdb::Int32Grid::create(0);
   grid->setName("part");
+  grid->insertMeta(part_count_key,
+                   openvdb::Int32Metadata(static_cast<std::int32_t>(surfaces.size())));
   Int32Tree& parts = grid->tree();
   for (const FloatGrid::ConstPtr& surface : surfaces) {
     grid->setTransform(surface->transform().copy());

@@ -133,5 +133,17 @@ TEST(Options, NearestWordIsSilentWhereNoneIsNear) {
   EXPECT_EQ(nearestWord("banana", words), "");
 }
 
+TEST(Options, AnOptionThatRepeatsTakesOneWordEachTime) {
+  Options options;
+  std::vector<std::string> holes;
+  std::string file;
+  options.texts("hole", holes, "X", "Holes");
+  options.positional("file", file, "A file");
+  options.parse(Words{"--hole", "a b", "part", "--hole=c"});
+  EXPECT_EQ(holes, (std::vector<std::string>{"a b", "c"}));
+  EXPECT_EQ(file, "part");
+  EXPECT_EQ(options.canonical(), "--hole 'a b' --hole c part");
+}
+
 }  // namespace
 }  // namespace vdbdither

@@ -1,0 +1,150 @@
+#include "ops/kernels/csg.h"
+
+#include <memory>
+#include <string>
+
+#include "io/slab_reader.h"
+#include "ops/kernels/part_index.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/find_grid.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::FloatGrid;
+using openvdb::Int32Grid;
+
+std::string latticeText(const Lattice& lattice) {
+  std::string text;
+  for (int axis = 0; axis < 3; ++axis)
+    text += (axis ? " x " : "") + shortestText(lattice.pitch_mm[axis]);
+  return text + " mm";
+}
+
+/// `surface`, and `part`, of two operands: what comes, and a second archive in step.
+class CsgOperator : public Filter {
+ public:
+  void declare(Options& options) override {
+    options.text("union", unite_, "FILE.vdb", "Adds the surface of this file or named pipe");
+    options.text("intersection", intersect_, "FILE.vdb", "Keeps what lies in this one, too");
+    options.text("difference", subtract_, "FILE.vdb", "Takes this one away");
+    options.choice("priority", priority_, {"first", "second"},
+                   "Whose part, and so whose material, is it where both are: of a union");
+  }
+
+  Schema plan(const Schema& in) override {
+    const int given = !unite_.empty() + !intersect_.empty() + !subtract_.empty();
+    if (given != 1) throw UsageError("give one of --union, --intersection and --difference");
+    operation_ = !unite_.empty()       ? Csg::unite
+                 : !intersect_.empty() ? Csg::intersect
+                                       : Csg::subtract;
+    const std::string& path = unite_ + intersect_ + subtract_;
+    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
+    other_ = std::make_unique<SlabReader>(path, std::vector<std::string>{});
+    const Schema& second = other_->schema();
+    checkLattices(in.lattice, second.lattice, path);
+    try {
+      empty_ = findGrid<FloatGrid>(second.grids, "surface");
+    } catch (const DataError& error) {
+      throw DataError("'" + path + "': " + error.what());
+    }
+
+    Schema out = in;
+    out.grids["surface"] = emptyCombined(*surface, *empty_);
+    for (const char* name : {"N", "closest"}) out.grids.erase(name);
+    out.leaves_per_row += second.leaves_per_row;
+    if (operation_ == Csg::unite) {
+      out.lattice.box.expand(second.lattice.box);
+      planParts(in, second, path);
+      out.grids["part"] = emptyParts(*surface);
+    }
+    return out;
+  }
+
+  [[nodiscard]] std::vector<Read> reads() const override {
+    std::vector<Read> reads{{"surface", Reach::point()}};
+    if (first_has_parts_) reads.push_back({"part", Reach::point()});
+    return reads;
+  }
+
+  [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
+
+  [[nodiscard]] Grids run(const Slab& in) const override {
+    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
+    const ZRange there = intersection(in.core, other_->schema().lattice.layers());
+    const Grids second = there.empty() ? Grids{} : other_->run(there);
+    const auto others =
+        second.contains("surface") ? findGrid<FloatGrid>(second, "surface") : empty_;
+    Grids out{{"surface", combined(*surface, *others, operation_, in.core)}};
+    if (operation_ != Csg::unite) return out;
+    const auto parts = first_has_parts_ ? findGrid<Int32Grid>(in.grids, "part") : nullptr;
+    const auto others_parts = second_has_parts_ && second.contains("part")
+                                  ? findGrid<Int32Grid>(second, "part")
+                                  : nullptr;
+    const auto united = unitedParts(*surface, *others, parts.get(), others_parts.get(),
+                                    first_parts_, priority_ == "second", in.core);
+    united->insertMeta(*emptyParts(*surface));
+    out["part"] = united;
+    return out;
+  }
+
+ private:
+  static void checkLattices(const Lattice& first, const Lattice& second, const std::string& path) {
+    if (first.pitch_mm == second.pitch_mm && first.origin_mm == second.origin_mm) return;
+    if (first.pitch_mm == second.pitch_mm)
+      throw DataError("'" + path + "' lies on a shifted lattice; make both with one --refine-y");
+    throw DataError("'" + path + "' lies on a lattice of " + latticeText(second) +
+                    ", and what comes on one of " + latticeText(first) +
+                    "; make both for one printer");
+  }
+
+  void planParts(const Schema& first, const Schema& second, const std::string& path) {
+    first_has_parts_ = first.grids.contains("part");
+    second_has_parts_ = second.grids.contains("part");
+    first_parts_ = first_has_parts_ ? partsOf(first.grids, "what comes") : 1;
+    parts_ = first_parts_ + (second_has_parts_ ? partsOf(second.grids, "'" + path + "'") : 1);
+  }
+
+  static int partsOf(const Grids& grids, const std::string& where) {
+    const auto count =
+        findGrid<Int32Grid>(grids, "part")->getMetadata<openvdb::Int32Metadata>(part_count_key);
+    if (!count)
+      throw DataError(where + ": grid 'part' does not say how many there are (its metadata " +
+                      part_count_key + "); make it again");
+    return count->value();
+  }
+
+  [[nodiscard]] Int32Grid::Ptr emptyParts(const FloatGrid& surface) const {
+    const auto grid = Int32Grid::create(0);
+    grid->setName("part");
+    grid->setTransform(surface.transform().copy());
+    grid->insertMeta(part_count_key, openvdb::Int32Metadata(parts_));
+    return grid;
+  }
+
+  std::string unite_;
+  std::string intersect_;
+  std::string subtract_;
+  std::string priority_ = "first";
+
+  Csg operation_ = Csg::unite;
+  std::unique_ptr<SlabReader> other_;
+  FloatGrid::ConstPtr empty_;  ///< the second operand's where it has no layers
+  bool first_has_parts_ = false;
+  bool second_has_parts_ = false;
+  int first_parts_ = 1;
+  int parts_ = 2;
+};
+
+}  // namespace
+
+extern const OperatorInfo csg;
+const OperatorInfo csg{
+    "csg", "Union, intersection or difference of two surfaces",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 --scale 0.6 -o core.vdb\nmesh2sdf "
+    "part.stl --printer mimaki-3duj-553 ! csg --difference core.vdb -o rind.vdb",
+    []() -> std::unique_ptr<Operator> { return std::make_unique<CsgOperator>(); }};
+
+}  // namespace vdbdither

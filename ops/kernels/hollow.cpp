@@ -1,0 +1,60 @@
+#include "ops/kernels/hollow.h"
+
+#include <vector>
+
+#include "ops/kernels/leaf_bits.h"
+#include "ops/kernels/surface_leaves.h"
+
+namespace vdbdither {
+
+using openvdb::Coord;
+using openvdb::Vec3d;
+
+namespace {
+
+/// The drains that come nearer than `band_mm` to a voxel of the leaf.
+std::vector<Drain> drainsNear(std::span<const Drain> drains, const Lattice& lattice,
+                              const Coord& origin, double band_mm) {
+  const Vec3d half_mm = 0.5 * (leaf_layers - 1) * lattice.pitch_mm;
+  const Vec3d middle_mm = lattice.position(origin) + half_mm;
+  std::vector<Drain> near;
+  for (const Drain& drain : drains) {
+    if (drain.distanceMm(middle_mm) < half_mm.length() + band_mm) near.push_back(drain);
+  }
+  return near;
+}
+
+}  // namespace
+
+openvdb::FloatGrid::Ptr hollowed(const openvdb::FloatGrid& surface, const Lattice& lattice,
+                                 double thickness_mm, std::span<const Drain> drains,
+                                 float background_mm, ZRange core) {
+  const std::vector<const FloatLeaf*> sources = leavesIn(surface.tree(), core);
+  std::vector<Coord> origins;
+  for (const FloatLeaf* leaf : sources) origins.push_back(leaf->origin());
+  std::vector<LeafValues> leaves(sources.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {
+    const openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor(surface.tree());
+    for (std::size_t n = range.begin(); n != range.end(); ++n) {
+      LeafValues& values = leaves[n];
+      values = LeafValues::of(accessor, origins[n]);
+      const std::vector<Drain> near = drainsNear(drains, lattice, origins[n], background_mm);
+      for (unsigned offset = 0; offset < 512; ++offset) {
+        const double d = values.distance[offset];
+        const double under = -(d + thickness_mm);
+        double shell = std::max(d, under);
+        // Of a distance that is not known only the side counts: outside, or in the cavity.
+        if (!(values.active[offset / 64] >> (offset % 64) & 1U)) shell = background_mm;
+        for (const Drain& drain : near) {
+          const double beside =
+              -drain.distanceMm(lattice.position(sources[n]->offsetToGlobalCoord(offset)));
+          shell = std::max(shell, beside);
+        }
+        values.distance[offset] = static_cast<float>(shell);
+      }
+    }
+  });
+  return surfaceOf(surface, background_mm, core, origins, leaves, {});
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <span>
+
+#include <openvdb/openvdb.h>
+
+#include "ops/kernels/drain.h"
+#include "vdbdither/lattice.h"
+
+namespace vdbdither {
+
+/// A shell under the surface: max(d, −(d + thickness)), less the drains.
+///
+/// Its inner surface is a zero set of its own, with true distances from the side of the cavity and,
+/// within the shell, all but behind the re-entrant edges of `combined`. A voxel whose distance is
+/// not known is beyond the shell on its side.
+///
+/// \param surface        d in mm; holds thickness_mm + background_mm
+/// \param background_mm  of the result: how far from its surfaces distances are kept
+openvdb::FloatGrid::Ptr hollowed(const openvdb::FloatGrid& surface, const Lattice& lattice,
+                                 double thickness_mm, std::span<const Drain> drains,
+                                 float background_mm, ZRange core);
+
+}  // namespace vdbdither

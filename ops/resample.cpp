@@ -1,0 +1,264 @@
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <unistd.h>
+
+#include <tbb/parallel_reduce.h>
+
+#include "io/target_lattice.h"
+#include "io/vdb.h"
+#include "ops/kernels/held_band.h"
+#include "ops/kernels/zero_set_distance.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using openvdb::Mat4d;
+using openvdb::Vec3d;
+
+constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{
+    {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}, {"um", 0.001}}};
+
+FloatGrid::ConstPtr asFloats(const GridConstPtr& grid) {
+  if (const auto floats = openvdb::gridConstPtrCast<FloatGrid>(grid)) return floats;
+  if (const auto doubles = openvdb::gridConstPtrCast<openvdb::DoubleGrid>(grid))
+    return std::make_shared<FloatGrid>(*doubles);
+  return nullptr;
+}
+
+void checkFinite(const FloatGrid& grid, const std::string& name) {
+  std::vector<const openvdb::FloatTree::LeafNodeType*> leaves;
+  grid.tree().getNodes(leaves);
+  const bool finite = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, leaves.size()), true,
+      [&](const auto& range, bool good) {
+        for (std::size_t n = range.begin(); n != range.end() && good; ++n) {
+          const float* values = leaves[n]->buffer().data();
+          good = std::all_of(values, values + openvdb::FloatTree::LeafNodeType::SIZE,
+                             [](float value) { return std::isfinite(value); });
+        }
+        return good;
+      },
+      std::logical_and<>());
+  bool tiles = true;
+  auto tile = grid.tree().cbeginValueAll();
+  tile.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) tiles = tiles && std::isfinite(*tile);
+  if (!finite || !tiles)
+    throw DataError("grid '" + name + "' holds values that are not finite numbers");
+}
+
+/// `surface` from a level set or a fog volume of another tool.
+class Resample : public Source {
+ public:
+  void declare(Options& options) override {
+    options.positional(
+        "file", path_,
+        "The .vdb of any tool, with any affine transform; - or nothing is standard input", false);
+    options.text("printer", printer_, "NAME|FILE.json", "The printer whose lattice to use");
+    options.text("pitch", pitch_, "DX,DY,DZ", "The lattice's pitch, in place of a printer's");
+    options.text("grid", grid_name_, "NAME",
+                 "Which grid; unless given 'surface', or the only one of numbers");
+    options.choice("kind", kind_, {"auto", "level-set", "fog"},
+                   "What the grid is: a level set, inside below the level, or fog, inside above "
+                   "it; auto takes its class");
+    options.text("level", level_, "X",
+                 "The value at the surface; 0 of a level set and 0.5 of fog unless given");
+    options.choice("unit", unit_, {"mm", "cm", "m", "in", "um"},
+                   "What the numbers of the grid's transform mean");
+    options.number("scale", scale_, 1e-6, 1e6, "Scales the part about the origin");
+    options.flag("place", place_,
+                 "Puts the part on the bed: its bounding box begins at the origin");
+    options.length("band", band_mm_,
+                   "How far from the surface distances are kept; one voxel diameter along the "
+                   "normal unless given");
+  }
+
+  Schema plan() override {
+    Schema schema;
+    const Vec3d pitch_mm = targetPitchMm(printer_, pitch_, schema);
+    if (band_mm_ < 0) throw UsageError("--band: is below zero");
+    const FloatGrid::ConstPtr grid = readSurface(schema);
+    surface_ = zeroSet(grid, pitch_mm);
+    schema.lattice = latticeAround(surface_->bounds(), pitch_mm);
+    const Band band{1, band_mm_};
+    schema.leaves_per_row = leavesPerRow(schema.lattice, band);
+    held_band_mm_ = band.leastMm(pitch_mm);
+    field_ = std::make_unique<ZeroSetDistance>(surface_, schema.lattice, band, slack_mm_);
+    const int bottom = schema.lattice.layers().begin;
+    schema.grids = run({bottom, bottom});
+    return schema;
+  }
+
+  [[nodiscard]] double memoryBytes() const override { return surface_->memoryBytes(); }
+
+  [[nodiscard]] Grids run(ZRange core) const override {
+    const FloatGrid::Ptr surface = field_->run(core);
+    setHeldBandMm(*surface, held_band_mm_);
+    return {{"surface", surface}};
+  }
+
+ private:
+  [[nodiscard]] bool isPipe() const { return path_.empty() || path_ == "-"; }
+
+  FloatGrid::ConstPtr readSurface(Schema& schema) {
+    if (isPipe() && ::isatty(STDIN_FILENO))
+      throw UsageError("nothing is piped in; name a file: resample part.vdb");
+    const VdbContents contents =
+        isPipe() ? readVdbPipe(STDIN_FILENO, "standard input") : readVdb(path_);
+    if (const auto history = contents.metadata.find("vdbdither:history");
+        history != contents.metadata.end()) {
+      schema.metadata.insert(*history);
+    }
+    FloatGrid::ConstPtr grid = asFloats(chosen(contents.grids));
+    if (!grid)
+      throw DataError("grid '" + grid_name_ + "' is of " +
+                      contents.grids.at(grid_name_)->valueType() + ", not of float or double");
+    if (!grid->transform().isLinear())
+      throw DataError("grid '" + grid_name_ +
+                      "' lies in a frustum; only affine transforms will do");
+    checkFinite(*grid, grid_name_);
+    return grid;
+  }
+
+  GridConstPtr chosen(const Grids& grids) {
+    std::string numbers;
+    std::string names;
+    int count = 0;
+    for (const auto& [name, grid] : grids) {
+      names += " '" + name + "'";
+      if (!grid->isType<FloatGrid>() && !grid->isType<openvdb::DoubleGrid>()) continue;
+      numbers = name;
+      ++count;
+    }
+    if (grid_name_.empty()) {
+      if (grids.contains("surface")) {
+        grid_name_ = "surface";
+      } else if (count == 1) {
+        grid_name_ = numbers;
+      } else {
+        throw UsageError("--grid: say which of" + (names.empty() ? " no grids" : names));
+      }
+    }
+    const auto found = grids.find(grid_name_);
+    if (found == grids.end())
+      throw UsageError("--grid: no grid '" + grid_name_ + "'; there are" + names);
+    return found->second;
+  }
+
+  [[nodiscard]] ZeroSet::Reading readingOf(const FloatGrid& grid) const {
+    ZeroSet::Reading reading;
+    const bool level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
+    const bool fog = grid.getGridClass() == openvdb::GRID_FOG_VOLUME;
+    if (kind_ == "auto" && !level_set && !fog)
+      throw UsageError("grid '" + grid_name_ +
+                       "' does not say what it is; give --kind level-set or --kind fog");
+    reading.above = kind_ == "fog" || (kind_ == "auto" && fog);
+    reading.level = reading.above ? 0.5F : 0.0F;
+    if (!level_.empty()) {
+      const auto [end, error] =
+          std::from_chars(level_.data(), level_.data() + level_.size(), reading.level);
+      if (error != std::errc() || end != level_.data() + level_.size() ||
+          !std::isfinite(reading.level))
+        throw UsageError("--level: '" + level_ + "' is not a number");
+    }
+    const float outside = grid.background();
+    if (reading.above ? outside > reading.level : outside < reading.level)
+      throw DataError("grid '" + grid_name_ + "' is inside everywhere beyond its voxels; check " +
+                      "--kind and --level");
+    return reading;
+  }
+
+  std::shared_ptr<const ZeroSet> zeroSet(const FloatGrid::ConstPtr& grid, const Vec3d& pitch_mm) {
+    const auto unit = std::find_if(units_mm.begin(), units_mm.end(),
+                                   [this](const auto& known) { return known.first == unit_; });
+    Mat4d map = grid->transform().baseMap()->getAffineMap()->getMat4();
+    map.postScale(Vec3d(unit->second * scale_));
+    if (!(std::abs(map.det()) > 0))
+      throw DataError("grid '" + grid_name_ + "' has a transform without volume");
+    const ZeroSet::Reading reading = readingOf(*grid);
+    const double least_mm = std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
+    double cell_mm = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3d step(map(axis, 0), map(axis, 1), map(axis, 2));
+      cell_mm = std::max(cell_mm, step.length());
+    }
+    // Divisions are larger than voxels for speed; what is off, by about an eighth of a division's
+    // square over the cell where the surface bends within one, is corrected and added to the band.
+    const double divisions = std::clamp(std::ceil(std::sqrt(cell_mm / least_mm) / 2), 1.0, 8.0);
+    slack_mm_ = cell_mm / (8 * divisions * divisions);
+    division_mm_ = cell_mm / divisions;
+    const auto made = [&](const Mat4d& placed) {
+      return std::make_shared<const ZeroSet>(grid, placed, reading, static_cast<int>(divisions));
+    };
+    auto surface = made(map);
+    if (surface->cells() == 0)
+      throw DataError("grid '" + grid_name_ + "' has no surface: none of its values pass " +
+                      shortestText(double{reading.level}) + "; check --kind and --level");
+    if (!place_) return surface;
+    map.postTranslate(-surface->bounds().min);
+    return made(map);
+  }
+
+  [[nodiscard]] Lattice latticeAround(const ZeroSet::Bounds& bounds, const Vec3d& pitch_mm) const {
+    const double margin_mm = std::max(pitch_mm.length(), band_mm_);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double furthest_mm =
+          std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) + margin_mm;
+      if (!(furthest_mm / pitch_mm[axis] < 1e8))
+        throw DataError("the part reaches " + shortestText(furthest_mm) +
+                        " mm from the origin, more voxels than can be counted; check --unit and "
+                        "--scale");
+    }
+    return {pitch_mm, Vec3d(0, 0, 0),
+            CoordBBox(Coord::floor((bounds.min - margin_mm) / pitch_mm),
+                      Coord::ceil((bounds.max + margin_mm) / pitch_mm))};
+  }
+
+  /// As if the surface were spread evenly over the layers but for a factor of two.
+  [[nodiscard]] double leavesPerRow(const Lattice& lattice, const Band& band) const {
+    // Three divisions are passed where the area is that of the faces of two.
+    const double area = surface_->cells() * division_mm_ * division_mm_ / 1.5;
+    const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
+    const double across_mm = 0.5 * (leaf_mm.x() + leaf_mm.y() + leaf_mm.z());
+    const double leaves =
+        area * (2 * band.greatestMm(lattice.pitch_mm) + across_mm) / leaf_mm.product();
+    return 2 * leaves / (lattice.layers().size() / static_cast<double>(leaf_layers) + 1);
+  }
+
+  std::string path_;
+  std::string printer_;
+  std::string pitch_;
+  std::string grid_name_;
+  std::string kind_ = "auto";
+  std::string level_;
+  std::string unit_ = "mm";
+  double scale_ = 1;
+  bool place_ = false;
+  double band_mm_ = 0;
+
+  double division_mm_ = 0;
+  double slack_mm_ = 0;
+  double held_band_mm_ = 0;
+  std::shared_ptr<const ZeroSet> surface_;
+  std::unique_ptr<ZeroSetDistance> field_;
+};
+
+}  // namespace
+
+extern const OperatorInfo resample;
+const OperatorInfo resample{
+    "resample", "Signed distance in mm from a level set or fog volume of any tool",
+    "mesh2sdf part.stl --pitch 50um,50um,50um -o cubes.vdb\nresample cubes.vdb "
+    "--printer mimaki-3duj-553 -o surface.vdb",
+    []() -> std::unique_ptr<Operator> { return std::make_unique<Resample>(); }};
+
+}  // namespace vdbdither
