@@ -68,7 +68,7 @@ class Render : public Sink {
   [[nodiscard]] bool standsAlone() const override { return files_.size() == 2; }
 
   void plan(const Schema& in) override {
-    if (files_.empty() || files_.size() > 2)
+    if (files_.size() > 2)
       throw UsageError("name the picture to write, and before it at most one mesh to draw");
     const std::string& picture = files_.back();
     if (!picture.ends_with(".png") && !picture.ends_with(".exr"))
