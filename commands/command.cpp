@@ -6,9 +6,10 @@ namespace vdbdither {
 
 extern const CommandInfo docs;
 extern const CommandInfo printers;
+extern const CommandInfo ssim;
 
 std::span<const CommandInfo* const> commands() {
-  static constexpr std::array<const CommandInfo*, 2> entries{&docs, &printers};
+  static constexpr std::array<const CommandInfo*, 3> entries{&docs, &printers, &ssim};
   return entries;
 }
 

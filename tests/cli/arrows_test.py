@@ -39,7 +39,7 @@ class Arrows(unittest.TestCase):
         self.assert_includes("ops", "ops/kernels/", "io/", "vdbdither/")
 
     def test_commands_know_no_operator(self):
-        self.assert_includes("commands", "commands/", "io/", "vdbdither/")
+        self.assert_includes("commands", "commands/", "ops/kernels/", "io/", "vdbdither/")
 
     def test_operators_have_no_headers(self):
         self.assertEqual([path.name for path in sources("ops") if path.suffix == ".h"], [])
