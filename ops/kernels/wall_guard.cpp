@@ -46,7 +46,8 @@ bool WallGuard::allows(const Coord& ijk, const openvdb::Vec3s& normal, float d_m
         const double rise = openvdb::Vec3d(normal).dot(to);
         const double expected_mm = depth_mm - away * rise;
         const double bend_mm = (to.lengthSqr() - rise * rise) / (2 * least_radius_mm);
-        const double there_mm = depth(ijk.offsetBy(i, j, k), -away, band_mm);
+        // Beyond the band on the other side, where it mostly should be: at least so far.
+        const double there_mm = std::max(depth(ijk.offsetBy(i, j, k), -away, band_mm), -band_mm);
         if (there_mm < half_diameter_mm && expected_mm - there_mm > bend_mm + 0.02 * rise_all_mm)
           return false;
       }

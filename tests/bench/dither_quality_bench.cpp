@@ -4,7 +4,7 @@
 // Prints one JSON object per line; samples/paper/quality.py makes the tables of docs/evaluation.md
 // of them.
 //
-//     dither_quality_bench MASK.vdb facets|sweep|smooth|detail [NAME OF THE MASK]
+//     dither_quality_bench MASK.vdb facets|sweep|smooth|detail [NAME OF THE MASK [METHOD]]
 
 #include <array>
 #include <cmath>
@@ -567,11 +567,13 @@ std::vector<Detail> detailsOn(const Vec3d& pitch) {
   return details;
 }
 
-void detail(const ThresholdMask& mask, const std::string& mask_name) {
+void detail(const ThresholdMask& mask, const std::string& mask_name, const std::string& only) {
   std::vector<Method> methods = methodsFor(mask, false);
   methods.push_back(dithered("best unguarded", mask, 2, DitherAt::voxel, true, false));
   methods.push_back(dithered("2 voxel", mask, 2, DitherAt::voxel));
   methods.push_back(coverage(mask));
+  if (!only.empty())
+    std::erase_if(methods, [&](const Method& method) { return method.name != only; });
   for (const auto& [name, pitch] : lattices) {
     for (const Detail& piece : detailsOn(pitch)) {
       const auto surface = surfaceOf(piece.part);
@@ -644,7 +646,8 @@ void detail(const ThresholdMask& mask, const std::string& mask_name) {
 int main(int argc, char** argv) {
   using namespace vdbdither;
   if (argc < 3) {
-    std::cerr << "usage: dither_quality_bench MASK.vdb facets|sweep|smooth|detail [NAME]\n";
+    std::cerr
+        << "usage: dither_quality_bench MASK.vdb facets|sweep|smooth|detail [NAME [METHOD]]\n";
     return 2;
   }
   initializeVdb();
@@ -655,5 +658,5 @@ int main(int argc, char** argv) {
   if (what == "facets") facets(mask, name, false);
   if (what == "sweep") facets(mask, name, true);
   if (what == "smooth") smooth(mask, name);
-  if (what == "detail") detail(mask, name);
+  if (what == "detail") detail(mask, name, argc > 4 ? argv[4] : "");
 }

@@ -8,8 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "ops/kernels/gradient.h"
+#include "ops/kernels/mesh_distance.h"
 #include "ops/kernels/voxel_diameter.h"
 #include "tests/support/dither_reference.h"
+#include "tests/support/shapes.h"
 
 namespace vdbdither {
 namespace {
@@ -351,7 +353,7 @@ bool referenceGuard(const FloatGrid& surface, const Coord& v, const Vec3d& norma
     const double rise = normal.dot(by);
     const double expected = std::abs(d) + own * rise;
     const double bend = (by.lengthSqr() - rise * rise) / 0.6;
-    const double there = depth(v + to, own);
+    const double there = std::max(depth(v + to, own), -band);
     if (there < test::halfDiameter(normal, pitch_mm) && expected - there > bend + 0.02 * tau)
       return false;
   }
@@ -409,6 +411,26 @@ TEST(ShapeDither, TheGuardChangesNothingOnASurfaceThatIsThickEverywhere) {
     for (const Shape& shape : {ball, ring})
       EXPECT_EQ(printed(bestOn(pitch_mm), shape).dithered,
                 printed(bestOn(pitch_mm, false), shape).dithered);
+  }
+}
+
+TEST(ShapeDither, TheGuardNeedsNoWiderBandThanOneDiameter) {
+  for (const Vec3d& pitch_mm : lattices) {
+    for (const Mesh& mesh : {test::sphereMesh({0.013, -0.02, 0.007}, 1.2, 60),
+                             test::transformed(test::torusMesh(Vec3d(0.0), 0.8, 0.4, 80),
+                                               {20, 35, 10}, Vec3d(0.01))}) {
+      const Lattice lattice = test::latticeAround(pitch_mm, Vec3d(1.3), 0.3);
+      const auto made =
+          MeshDistance(std::make_shared<Mesh>(mesh), lattice, Band{}).run(lattice.layers());
+      const auto solid = [&](bool guarded) {
+        return test::dense(
+            *bestOn(pitch_mm, guarded)
+                 .run(*made.surface, nullptr, lattice.layers(), lattice.layers(), false)
+                 .solid,
+            lattice.box);
+      };
+      EXPECT_EQ(test::differences(solid(true), solid(false)), 0) << pitch_mm;
+    }
   }
 }
 
