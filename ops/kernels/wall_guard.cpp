@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace vdbdither {
 
@@ -37,38 +36,45 @@ bool WallGuard::allows(const Coord& ijk, const openvdb::Vec3s& normal, float d_m
 
   const double half_diameter_mm = 0.5 / steepest_per_mm;
   const double depth_mm = std::abs(double{d_mm});
-  const int away = d_mm < 0 ? 1 : -1;  // from the side that the voxel lies on
-  // The sheet: no neighbour that might be overturned, or has been decided, where the face is not.
+  const int own = d_mm < 0 ? -1 : 1;  // the side that the voxel lies on
+  const auto sample = [&](int side, int i, int j, int k) {
+    return std::clamp(distance(ijk.offsetBy(i, j, k), side, band_mm), -band_mm, band_mm);
+  };
+
+  // T on its own side, one step further in, then across the face, as many steps as it takes to tell
+  // thick from thin.
+  const int steps = 1 + static_cast<int>(1.5 * depth_mm / rise_all_mm + 0.95);
+  if (sample(own, own * outward.x(), own * outward.y(), own * outward.z()) < half_diameter_mm)
+    return false;
+  const int across = -own * steps;
+  const double beyond_mm =
+      sample(-own, across * outward.x(), across * outward.y(), across * outward.z());
+  if (beyond_mm <= -band_mm ||
+      beyond_mm < 2 * depth_mm + half_diameter_mm - (steps - 1) * rise_all_mm)
+    return false;
+
   for (int i = -1; i <= 1; ++i) {
     for (int j = -1; j <= 1; ++j) {
       for (int k = -1; k <= 1; ++k) {
         const openvdb::Vec3d to(pitch_mm_[0] * i, pitch_mm_[1] * j, pitch_mm_[2] * k);
         const double rise = openvdb::Vec3d(normal).dot(to);
-        const double expected_mm = depth_mm - away * rise;
+        const double flat_mm = std::clamp(depth_mm + own * rise, -band_mm, band_mm);
         const double bend_mm = (to.lengthSqr() - rise * rise) / (2 * least_radius_mm);
-        // Beyond the band on the other side, where it mostly should be: at least so far.
-        const double there_mm = std::max(depth(ijk.offsetBy(i, j, k), -away, band_mm), -band_mm);
-        if (there_mm < half_diameter_mm && expected_mm - there_mm > bend_mm + 0.02 * rise_all_mm)
+        const double there_mm = sample(own, i, j, k);
+        if (std::min(flat_mm, there_mm) < half_diameter_mm &&
+            std::abs(flat_mm - there_mm) > bend_mm + 0.02 * rise_all_mm)
           return false;
       }
     }
   }
-  const Coord own(ijk.x() - away * outward.x(), ijk.y() - away * outward.y(),
-                  ijk.z() - away * outward.z());
-  if (depth(own, -away, band_mm) < depth_mm) return false;
-  // On the other side, as many steps as it takes to tell thick from thin.
-  const int steps = 1 + static_cast<int>(2 * depth_mm / rise_all_mm + 0.8);
-  const Coord across(ijk.x() + away * steps * outward.x(), ijk.y() + away * steps * outward.y(),
-                     ijk.z() + away * steps * outward.z());
-  return depth(across, away, band_mm) >= 3 * depth_mm - (steps - 1) * rise_all_mm;
+  return true;
 }
 
-double WallGuard::depth(const Coord& ijk, int side, double band_mm) {
+double WallGuard::distance(const Coord& ijk, int side, double band_mm) {
   float value = static_cast<float>(background_mm_);
   const bool active = valid_.contains(ijk.z()) && surface_.probeValue(ijk, value);
-  const double depth_mm = side * double{value};
-  if (active) return depth_mm;
-  return depth_mm < 0 ? -std::numeric_limits<double>::infinity() : band_mm;
+  const double distance_mm = side * double{value};
+  return active ? distance_mm : std::copysign(band_mm, distance_mm);
 }
 
 }  // namespace vdbdither

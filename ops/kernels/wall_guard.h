@@ -12,23 +12,22 @@ namespace vdbdither {
 /// its 26 neighbours, and T the local thickness of the part, or of the gap. A voxel at the distance
 /// d may be overturned where
 ///
-/// 1. 2|d| + τ ≤ T on both sides of the face. What no dither may touch, the slab deeper than |d|
-///    from both faces, is then as thick as the longest step between neighbours: no path of
-///    neighbours, by faces, edges or corners, leads through it. So in walls between parallel faces
-///    no tunnel is opened that plain voxelization has not, and what it keeps apart between such
-///    faces is not joined. Walls thinner than τ stay as they are. The rule is the same on both
-///    sides of a face, so a wall keeps its mean thickness.
+/// 1. |d| + k_D + τ ≤ T on both sides of the face. |d| < k_D, so what no dither may touch, the slab
+///    deeper than |d| from both faces, is at least as thick as the longest step between neighbours:
+///    no path of neighbours, by faces, edges or corners, leads through it. So in walls between
+///    parallel faces no tunnel is opened that plain voxelization has not, and what it keeps apart
+///    between such faces is not joined; walls thinner than k_D + τ stay as they are.
 ///    T is measured at the voxel centre v ∓ m·e, where e steps by one voxel along every axis that
 ///    the normal has a part in: m·τ deeper, so T = −d(v) + m·τ − d(v − m·e), exact where that
 ///    centre lies beyond the wall's middle and less than T otherwise. m is the least that still
 ///    tells a thick wall. Nothing is interpolated.
-/// 2. the surface is one sheet here: no neighbour closer to the surface than k_D, on the voxel's
-///    own side or on the other, is closer than the flat face bent to a radius of 0.3 mm would have
-///    it. This is what tells the ends of bars, tips, wires and sharp edges, where T is not to be
+/// 2. the surface is one sheet here: no neighbour that is or should be closer to the surface than
+///    k_D differs in its distance from the flat face by more than one bent to a radius of 0.3 mm
+///    would. This is what tells the ends of bars, tips, wires and sharp edges, where T is not to be
 ///    had along the normal.
 ///
-/// Where a sample lies outside the band, on the side where it should, it counts as deep as a band
-/// of one diameter.
+/// Both rules are alike on the two sides of a face, so walls and wires keep their volume. Where a
+/// sample lies outside the band, it counts as at the end of a band of one diameter.
 class WallGuard {
  public:
   /// `surface`: d in mm; layers outside `valid` are outside the part.
@@ -41,12 +40,13 @@ class WallGuard {
   [[nodiscard]] bool allows(const openvdb::Coord& ijk, const openvdb::Vec3s& normal, float d_mm);
 
   /// How many layers away a sample may be, for displacements up to ½·amplitude·k_D.
-  static int reachLayers(double amplitude) { return 1 + static_cast<int>(amplitude / 2 + 0.8); }
+  static int reachLayers(double amplitude) {
+    return 1 + static_cast<int>(0.375 * amplitude + 0.96);
+  }
 
  private:
-  /// How far a voxel is from the surface on the side of positive distances (1) or negative (−1);
-  /// −∞ on the other side beyond the band.
-  double depth(const openvdb::Coord& ijk, int side, double band_mm);
+  /// How far a voxel is from the surface on the side of positive distances (1) or negative (−1).
+  double distance(const openvdb::Coord& ijk, int side, double band_mm);
 
   openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> surface_;
   openvdb::Vec3d pitch_mm_;

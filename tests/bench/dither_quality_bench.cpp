@@ -4,7 +4,7 @@
 // Prints one JSON object per line; samples/paper/quality.py makes the tables of docs/evaluation.md
 // of them.
 //
-//     dither_quality_bench MASK.vdb facets|sweep|smooth|detail [NAME OF THE MASK [METHOD]]
+//     dither_quality_bench MASK.vdb facets|sweep|heights|smooth|detail [NAME OF THE MASK [METHOD]]
 
 #include <array>
 #include <cmath>
@@ -343,6 +343,43 @@ void facets(const ThresholdMask& mask, const std::string& mask_name, bool every)
   }
 }
 
+/// The printed heights, µm, over 4 × 2 mm of facets 2° off z and off y, at points 40 µm apart.
+void heights(const ThresholdMask& mask) {
+  auto methods = methodsFor(mask, false);
+  methods.push_back(dithered("4 foot", mask, 4, DitherAt::foot));
+  methods.push_back(dithered("2 voxel", mask, 2, DitherAt::voxel));
+  const Vec3d pitch = lattices[0].pitch_mm;
+  for (const int a : {2, 1}) {
+    const double tilt = 2 * pi / 180;
+    const int b = a == 2 ? 0 : 2;
+    const int c = 3 - a - b;
+    Vec3d n(0.0);
+    n[a] = std::cos(tilt);
+    n[b] = std::sin(tilt);
+    Vec3d down(0.0);
+    down[a] = -std::sin(tilt);
+    down[b] = std::cos(tilt);
+    Vec3d across(0.0);
+    across[c] = 1;
+    Vec3d reach;
+    for (int q = 0; q < 3; ++q) reach[q] = 2 * std::abs(down[q]) + std::abs(across[q]) + 0.46;
+    const Part part{[=](const Vec3d& x) { return n.dot(x); }, latticeOver(pitch, -reach, reach)};
+    const auto surface = surfaceOf(part);
+    for (const Method& method : methods) {
+      const Blurred blurred(method.print(part, *surface), pitch, spreads_mm[0]);
+      std::cout << "{\"set\":\"heights\",\"axis\":" << a << ",\"method\":\"" << method.name
+                << "\",\"rows\":50,\"um\":[";
+      for (int i = 0; i < 50; ++i) {
+        for (int j = 0; j < 100; ++j) {
+          const Vec3d x = (0.04 * (j - 49.5)) * down + (0.04 * (i - 24.5)) * across;
+          std::cout << (i + j > 0 ? "," : "") << std::round(10000 * blurred.error(x, n)) / 10;
+        }
+      }
+      std::cout << "]}" << std::endl;
+    }
+  }
+}
+
 constexpr double relief_mm = 0.12;
 double reliefHeight(double x, double y) {
   return relief_mm * std::sin(2 * pi * x / 2.1 + 0.3) * std::cos(2 * pi * y / 1.7 + 0.1);
@@ -646,8 +683,8 @@ void detail(const ThresholdMask& mask, const std::string& mask_name, const std::
 int main(int argc, char** argv) {
   using namespace vdbdither;
   if (argc < 3) {
-    std::cerr
-        << "usage: dither_quality_bench MASK.vdb facets|sweep|smooth|detail [NAME [METHOD]]\n";
+    std::cerr << "usage: dither_quality_bench MASK.vdb facets|sweep|heights|smooth|detail [NAME "
+                 "[METHOD]]\n";
     return 2;
   }
   initializeVdb();
@@ -657,6 +694,7 @@ int main(int argc, char** argv) {
   const std::string name = argc > 3 ? argv[3] : "default";
   if (what == "facets") facets(mask, name, false);
   if (what == "sweep") facets(mask, name, true);
+  if (what == "heights") heights(mask);
   if (what == "smooth") smooth(mask, name);
   if (what == "detail") detail(mask, name, argc > 4 ? argv[4] : "");
 }
