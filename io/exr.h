@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "io/run_image.h"
+
 namespace vdbdither {
 
 struct ExrChannel {
@@ -16,9 +18,22 @@ struct ExrChannel {
 /// Fills one row of one channel; rows come top first, each channel once a row.
 using ExrRow = std::function<void(std::uint32_t row, std::size_t channel, std::span<float> values)>;
 
-/// The bytes of an OpenEXR file, ZIP-compressed by rows. `pixel_aspect` is a pixel's width over its
-/// height.
-std::vector<std::uint8_t> encodeExr(std::uint32_t width, std::uint32_t height, double pixel_aspect,
-                                    std::span<const ExrChannel> channels, const ExrRow& fill);
+enum class ExrPacking { none, rle, zips, zip, piz };
+
+struct ExrFormat {
+  double pixel_aspect = 1;  ///< a pixel's width over its height
+  ExrPacking packing = ExrPacking::zips;
+  int tile = 0;  ///< edge of the tiles, pixels; 0: rows in place of tiles
+};
+
+/// The bytes of an OpenEXR file. All packings are without loss. The rows of a row of tiles are held
+/// at a time, or a single row.
+std::vector<std::uint8_t> encodeExr(std::uint32_t width, std::uint32_t height,
+                                    const ExrFormat& format, std::span<const ExrChannel> channels,
+                                    const ExrRow& fill);
+
+/// A channel of whole numbers from 0, as runs of them. Throws DataError in words that go on from
+/// the file's name.
+RunImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel);
 
 }  // namespace vdbdither

@@ -36,7 +36,9 @@ class MappedFile {
     const std::string error = reason();
     ::close(file);
     if (!known) fail(path, "cannot be read: " + error);
-    if (S_ISDIR(status.st_mode)) fail(path, "a directory; name an STL, OBJ or PLY file in it");
+    if (S_ISDIR(status.st_mode))
+      fail(path, "a folder; name the meshes in it, as in " +
+                     (std::filesystem::path(path) / "*.stl").string());
     if (!S_ISREG(status.st_mode)) {
       fail(path, "a pipe or device; mesh input needs a regular file, save it first");
     }

@@ -17,42 +17,113 @@ using nlohmann::ordered_json;
 
 namespace {
 
-openvdb::Vec3d lengths(const ordered_json& values) {
-  openvdb::Vec3d result;
-  for (int axis = 0; axis < 3; ++axis) {
-    const ordered_json& value = values.at(axis);
-    result[axis] =
-        value.is_string() ? parseLengthMm(value.get<std::string>()) : value.get<double>();
+/// Reads a profile and notes everything that is wrong with it, rather than the first.
+class ProfileParser {
+ public:
+  explicit ProfileParser(const std::string& text) {
+    const ordered_json json = ordered_json::parse(text, nullptr, false);
+    if (!json.is_object()) {
+      problems_.emplace_back("the text is no JSON object");
+      return;
+    }
+    known(json, {"name", "title", "source", "pitch_mm", "build_mm", "point_spread_mm", "materials"},
+          "");
+    profile_.name = this->text(json, "name", "");
+    if (!json.contains("name")) problems_.emplace_back("there is no name");
+    profile_.title = json.contains("title") ? this->text(json, "title", "") : profile_.name;
+    profile_.source = json.contains("source") ? this->text(json, "source", "") : "";
+    profile_.pitch_mm = lengths(json, "pitch_mm", 1e-4, 100);
+    if (json.contains("build_mm")) profile_.build_mm = lengths(json, "build_mm", 0, 1e5);
+    if (json.contains("point_spread_mm"))
+      profile_.point_spread_mm = lengths(json, "point_spread_mm", 0, 10);
+    const ordered_json materials = json.value("materials", ordered_json::array());
+    if (!materials.is_array()) problems_.emplace_back("materials is no list");
+    for (const ordered_json& entry : materials) material(entry);
   }
-  return result;
-}
 
-PrinterProfile parse(const std::string& text) {
-  const ordered_json json = ordered_json::parse(text);
-  PrinterProfile profile;
-  profile.name = json.at("name");
-  profile.title = json.value("title", profile.name);
-  profile.source = json.value("source", "");
-  profile.pitch_mm = lengths(json.at("pitch_mm"));
-  if (json.contains("build_mm")) profile.build_mm = lengths(json.at("build_mm"));
-  for (const ordered_json& entry : json.value("materials", ordered_json::array())) {
-    Material material;
-    material.name = entry.at("name");
-    const ordered_json& rgba = entry.at("rgba");
-    for (std::size_t channel = 0; channel < 4; ++channel) material.rgba[channel] = rgba.at(channel);
-    profile.materials.push_back(material);
-  }
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(profile.pitch_mm[axis] >= 1e-4 && profile.pitch_mm[axis] <= 100)) {
-      throw UsageError("pitch_mm must be three lengths between 0.0001 and 100 mm");
+  [[nodiscard]] const PrinterProfile& profile() const { return profile_; }
+  [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
+
+ private:
+  /// Notes keys that nobody reads: they may be misspelt.
+  void known(const ordered_json& json, const std::vector<std::string>& keys,
+             const std::string& where) {
+    for (const auto& [key, value] : json.items()) {
+      if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
+      const std::string near = nearestWord(key, keys);
+      problems_.push_back(where + "'" + key + "' means nothing here" +
+                          (near.empty() ? "" : "; did you mean '" + near + "'?"));
     }
   }
-  return profile;
+
+  std::string text(const ordered_json& json, const char* key, const std::string& where) {
+    if (json.contains(key) && json[key].is_string()) return json[key];
+    if (json.contains(key)) problems_.push_back(where + key + " is no text");
+    return "";
+  }
+
+  openvdb::Vec3d lengths(const ordered_json& json, const std::string& key, double min_mm,
+                         double max_mm) {
+    openvdb::Vec3d result(0.0);
+    std::ostringstream problem_text;
+    problem_text << key << " must be three lengths between " << min_mm << " and " << max_mm
+                 << " mm";
+    const std::string problem = problem_text.str();
+    if (!json.contains(key) || !json[key].is_array() || json[key].size() != 3) {
+      problems_.push_back(problem);
+      return result;
+    }
+    bool proper = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      const ordered_json& value = json[key][axis];
+      try {
+        result[axis] = value.is_string()   ? parseLengthMm(value.get<std::string>())
+                       : value.is_number() ? value.get<double>()
+                                           : -1;
+      } catch (const UsageError&) {
+        proper = false;
+      }
+      proper &= result[axis] >= min_mm && result[axis] <= max_mm;
+    }
+    if (!proper) problems_.push_back(problem);
+    return result;
+  }
+
+  void material(const ordered_json& entry) {
+    const std::string where = "material " + std::to_string(profile_.materials.size() + 1) + ": ";
+    Material& material = profile_.materials.emplace_back();
+    if (!entry.is_object()) {
+      problems_.push_back(where + "it is no JSON object");
+      return;
+    }
+    known(entry, {"name", "rgba"}, where);
+    material.name = text(entry, "name", where);
+    if (material.name.empty()) problems_.push_back(where + "there is no name");
+    const ordered_json rgba = entry.value("rgba", ordered_json());
+    bool proper = rgba.is_array() && rgba.size() == 4;
+    for (std::size_t channel = 0; proper && channel < 4; ++channel) {
+      proper = rgba[channel].is_number_integer() && rgba[channel] >= 0 && rgba[channel] <= 255;
+      if (proper) material.rgba[channel] = rgba[channel];
+    }
+    if (!proper) problems_.push_back(where + "rgba must be four whole numbers from 0 to 255");
+    for (auto other = profile_.materials.begin(); &*other != &material; ++other) {
+      if (other->name == material.name)
+        problems_.push_back(where + "'" + material.name + "' is there twice");
+    }
+  }
+
+  PrinterProfile profile_;
+  std::vector<std::string> problems_;
+};
+
+PrinterProfile parse(const std::string& text) {
+  const ProfileParser parser(text);
+  if (!parser.problems().empty()) throw DataError(parser.problems().front());
+  return parser.profile();
 }
 
-}  // namespace
-
-PrinterProfile readPrinterProfile(const std::string& name_or_path) {
+/// The file that `name_or_path` names and what it holds.
+std::pair<std::filesystem::path, std::string> readProfile(const std::string& name_or_path) {
   std::filesystem::path path = name_or_path;
   if (!name_or_path.ends_with(".json")) {
     const std::vector<std::string> names = installedPrinters();
@@ -64,14 +135,30 @@ PrinterProfile readPrinterProfile(const std::string& name_or_path) {
     path = *findDataFile("printers/" + name_or_path + ".json");
   }
   std::ifstream file(path);
-  if (!file) throw UsageError("no such printer profile '" + path.string() + "'");
   std::ostringstream text;
-  text << file.rdbuf();
+  if (!file || !(text << file.rdbuf()))
+    throw UsageError("no such printer profile '" + path.string() + "'");
+  return {path, text.str()};
+}
+
+}  // namespace
+
+PrinterProfile readPrinterProfile(const std::string& name_or_path) {
+  const auto [path, text] = readProfile(name_or_path);
   try {
-    return parse(text.str());
-  } catch (const std::exception& error) {
+    return parse(text);
+  } catch (const DataError& error) {
     throw DataError("'" + path.string() + "' is not a printer profile: " + error.what());
   }
+}
+
+std::vector<std::string> printerProfileProblems(const std::string& name_or_path) {
+  const auto [path, text] = readProfile(name_or_path);
+  const ProfileParser parser(text);
+  std::vector<std::string> problems = parser.problems();
+  if (!parser.profile().name.empty() && parser.profile().name != path.stem())
+    problems.push_back("its name '" + parser.profile().name + "' is not that of its file");
+  return problems;
 }
 
 std::string toJson(const PrinterProfile& profile) {
@@ -81,6 +168,10 @@ std::string toJson(const PrinterProfile& profile) {
   json["source"] = profile.source;
   json["pitch_mm"] = {profile.pitch_mm[0], profile.pitch_mm[1], profile.pitch_mm[2]};
   json["build_mm"] = {profile.build_mm[0], profile.build_mm[1], profile.build_mm[2]};
+  if (!profile.point_spread_mm.isZero()) {
+    json["point_spread_mm"] = {profile.point_spread_mm[0], profile.point_spread_mm[1],
+                               profile.point_spread_mm[2]};
+  }
   json["materials"] = ordered_json::array();
   for (const Material& material : profile.materials) {
     json["materials"].push_back({{"name", material.name}, {"rgba", material.rgba}});
@@ -91,7 +182,7 @@ std::string toJson(const PrinterProfile& profile) {
 PrinterProfile printerProfileFromJson(const std::string& text) {
   try {
     return parse(text);
-  } catch (const std::exception& error) {
+  } catch (const DataError& error) {
     throw DataError(std::string("the metadata vdbdither:printer is not a printer profile: ") +
                     error.what());
   }

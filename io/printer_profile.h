@@ -12,6 +12,10 @@ namespace vdbdither {
 /// there are), DataError when it is malformed.
 PrinterProfile readPrinterProfile(const std::string& name_or_path);
 
+/// Everything that is wrong with the profile called `name_or_path`, a line each. Throws UsageError
+/// when there is none.
+std::vector<std::string> printerProfileProblems(const std::string& name_or_path);
+
 /// The profile in one line of JSON, as grids carry it under `vdbdither:printer`; and back.
 std::string toJson(const PrinterProfile& profile);
 PrinterProfile printerProfileFromJson(const std::string& text);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace vdbdither {
@@ -27,6 +28,30 @@ struct RunImage {
     return std::span(runs).subspan(row_begin[y], row_begin[y + 1] - row_begin[y]);
   }
   friend bool operator==(const RunImage&, const RunImage&) = default;
+};
+
+/// Makes runs of pixels that come from left to right, row by row.
+class RunsBuilder {
+ public:
+  explicit RunsBuilder(std::uint32_t width) { image_.width = width; }
+
+  /// The pixel in column `x` of the present row has this value, and those after it until the next
+  /// call.
+  void pixel(std::uint32_t x, std::uint32_t value) {
+    if (x > 0 && value == value_) return;
+    if (x > 0) image_.runs.push_back({x, value_});
+    value_ = value;
+  }
+  void endRow() {
+    image_.runs.push_back({image_.width, value_});
+    image_.row_begin.push_back(image_.runs.size());
+    ++image_.height;
+  }
+  [[nodiscard]] RunImage finish() { return std::move(image_); }
+
+ private:
+  RunImage image_{0, 0, {0}, {}};
+  std::uint32_t value_ = 0;
 };
 
 }  // namespace vdbdither

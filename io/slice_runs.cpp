@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <memory>
+#include <utility>
 
+#include <openvdb/tools/Prune.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -196,7 +199,127 @@ std::vector<RunImage> slice(const Grid& grid, const SliceFrame& frame, ZRange la
   return images;
 }
 
+using Leaf = openvdb::Int32Tree::LeafNodeType;
+
+/// The leaves of eight rows of eight layers: nodes with voxels of their own, and how many of their
+/// 64 rows are wholly of one value.
+class LeafStrip {
+ public:
+  LeafStrip(const SliceFrame& frame, int y, int z)
+      : frame_(frame),
+        y_(y),
+        z_(z),
+        first_(frame.box.min().x() >> 3),
+        leaves_(static_cast<std::size_t>((frame.box.max().x() >> 3) - first_ + 1)) {}
+
+  /// Where `images` hold the layers from `first_layer` on.
+  void fill(std::span<const RunImage> images, int first_layer) {
+    const auto each_run = [&](const auto& take) {
+      for (int row = 0; row < strip_rows; ++row) {
+        const int y = y_ + row / leaf_layers;
+        const int z = z_ + row % leaf_layers;
+        if (y < frame_.box.min().y() || y > frame_.box.max().y() || z < first_layer ||
+            z >= first_layer + std::ssize(images)) {
+          continue;
+        }
+        const int from_top = frame_.flip_y ? y - frame_.box.min().y() : frame_.box.max().y() - y;
+        std::uint32_t begin = 0;
+        for (const Run& run : images[z - first_layer].row(from_top + frame_.padding)) {
+          if (run.value) take(row, columns(begin, run.end), static_cast<std::int32_t>(run.value));
+          begin = run.end;
+        }
+      }
+    };
+    each_run([&](int, std::pair<int, int> x, std::int32_t value) { countWholeRows(x, value); });
+    each_run([&](int row, std::pair<int, int> x, std::int32_t value) { setVoxels(row, x, value); });
+  }
+
+  /// Hands over what was made.
+  void moveTo(openvdb::tree::ValueAccessor<openvdb::Int32Tree>& target) {
+    for (std::size_t i = 0; i < leaves_.size(); ++i) {
+      if (leaves_[i].whole_rows == strip_rows) {
+        target.addTile(1, origin(i), leaves_[i].value, true);
+      } else if (leaves_[i].node) {
+        target.addLeaf(leaves_[i].node.release());
+      }
+    }
+  }
+
+ private:
+  struct Place {
+    std::unique_ptr<Leaf> node;
+    std::int32_t value = 0;  ///< of the whole rows
+    int whole_rows = 0;      ///< of that value
+  };
+
+  [[nodiscard]] Coord origin(std::size_t i) const {
+    return {(first_ + static_cast<int>(i)) * leaf_layers, y_, z_};
+  }
+
+  /// The voxels, half open, behind columns of a picture.
+  [[nodiscard]] std::pair<int, int> columns(std::uint32_t begin, std::uint32_t end) const {
+    const int low = frame_.box.min().x();
+    const int high = frame_.box.max().x() + 1;
+    int from = static_cast<int>(begin) - frame_.padding;
+    int to = static_cast<int>(end) - frame_.padding;
+    if (frame_.flip_x) {
+      std::swap(from, to);
+      from = high - low - from;
+      to = high - low - to;
+    }
+    return {std::max(low, low + from), std::min(high, low + to)};
+  }
+
+  void countWholeRows(std::pair<int, int> x, std::int32_t value) {
+    for (int leaf = (x.first + leaf_layers - 1) >> 3; leaf < x.second >> 3; ++leaf) {
+      Place& place = leaves_[static_cast<std::size_t>(leaf - first_)];
+      if (place.whole_rows == 0) place.value = value;
+      if (place.value == value) ++place.whole_rows;
+    }
+  }
+
+  void setVoxels(int row, std::pair<int, int> x, std::int32_t value) {
+    for (int at = x.first; at < x.second;) {
+      const int leaf = at >> 3;
+      const int end = std::min(x.second, (leaf + 1) * leaf_layers);
+      const auto i = static_cast<std::size_t>(leaf - first_);
+      Place& place = leaves_[i];
+      if (place.whole_rows < strip_rows) {
+        if (!place.node) place.node = std::make_unique<Leaf>(origin(i), 0, false);
+        for (int column = at; column < end; ++column) {
+          place.node->setValueOn(static_cast<openvdb::Index>((column & 7) * strip_rows + row),
+                                 value);
+        }
+      }
+      at = end;
+    }
+  }
+
+  const SliceFrame& frame_;
+  int y_, z_;
+  int first_;  ///< leaf along x
+  std::vector<Place> leaves_;
+};
+
 }  // namespace
+
+openvdb::Int32Grid::Ptr gridOfRuns(std::span<const RunImage> images, const SliceFrame& frame,
+                                   ZRange layers) {
+  const auto grid = openvdb::Int32Grid::create(0);
+  auto target = grid->getAccessor();
+  const int y_begin = frame.box.min().y() & ~(leaf_layers - 1);
+  const int strip_count = (frame.box.max().y() - y_begin) / leaf_layers + 1;
+  const ZRange aligned = alignedToLeaves(layers);
+  for (int z = aligned.begin; z < aligned.end; z += leaf_layers) {
+    std::vector<LeafStrip> strips;
+    strips.reserve(strip_count);
+    for (int i = 0; i < strip_count; ++i) strips.emplace_back(frame, y_begin + i * leaf_layers, z);
+    tbb::parallel_for(0, strip_count, [&](int i) { strips[i].fill(images, layers.begin); });
+    for (LeafStrip& strip : strips) strip.moveTo(target);
+  }
+  openvdb::tools::prune(grid->tree());
+  return grid;
+}
 
 std::vector<RunImage> sliceRuns(const openvdb::Int32Grid& grid, const SliceFrame& frame,
                                 ZRange layers) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "io/run_image.h"
@@ -28,5 +29,10 @@ std::vector<RunImage> sliceRuns(const openvdb::Int32Grid& grid, const SliceFrame
 /// The same for a set of voxels: 1 where active and true, else 0.
 std::vector<RunImage> sliceRuns(const openvdb::BoolGrid& grid, const SliceFrame& frame,
                                 ZRange layers);
+
+/// The way back: a grid whose layers are the pictures `images`, the first one of them the layer
+/// `layers.begin`; 0 is inactive. What lies outside the frame's box is left out. In canonical form.
+openvdb::Int32Grid::Ptr gridOfRuns(std::span<const RunImage> images, const SliceFrame& frame,
+                                   ZRange layers);
 
 }  // namespace vdbdither

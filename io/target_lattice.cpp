@@ -12,7 +12,8 @@ using openvdb::Vec3d;
 
 Vec3d targetPitchMm(const std::string& printer, const std::string& pitch, Schema& schema) {
   if (printer.empty() == pitch.empty())
-    throw UsageError("give either --printer NAME or --pitch DX,DY,DZ");
+    throw UsageError(
+        "give either --printer NAME (vdbdither printers lists them) or --pitch DX,DY,DZ");
   if (!printer.empty()) {
     const PrinterProfile profile = readPrinterProfile(printer);
     schema.metadata["vdbdither:printer"] = toJson(profile);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <openvdb/io/Stream.h>
+#include <openvdb/tools/ChangeBackground.h>
 
 #include "io/archive_digest.h"
 #include "vdbdither/errors.h"
@@ -28,6 +29,8 @@ using openvdb::Vec3d;
 namespace {
 
 constexpr const char* box_key = "vdbdither:box";
+/// Of a grid of half floats: its background before it was rounded.
+constexpr const char* background_key = "vdbdither:background";
 
 std::uint32_t compressionFlags(VdbCodec codec) {
   switch (codec) {
@@ -44,12 +47,13 @@ std::uint32_t compressionFlags(VdbCodec codec) {
 /// OpenVDB's own File ignores failed writes, so the archive goes to a stream of ours.
 class StreamArchive : public openvdb::io::Archive {
  public:
-  StreamArchive(const VdbContents& contents, VdbCodec codec) {
+  StreamArchive(const VdbContents& contents, VdbCodec codec, bool as_half) {
     setCompression(compressionFlags(codec));
     for (const auto& [name, grid] : contents.grids) {
       // Names live in the metadata of a grid, and grids are shared: a shallow copy takes the name.
       openvdb::MetaMap metadata(*grid);
       metadata.insertMeta(GridBase::META_GRID_NAME, openvdb::StringMetadata(name));
+      if (as_half) addHalf(*grid, metadata);
       grids_.push_back(grid->copyGridReplacingMetadata(metadata));
     }
     for (const auto& [key, text] : contents.metadata)
@@ -61,6 +65,14 @@ class StreamArchive : public openvdb::io::Archive {
   }
 
  private:
+  static void addHalf(const GridBase& grid, openvdb::MetaMap& metadata) {
+    const std::string type = grid.valueType();
+    if (type != "float" && type != "double" && !type.starts_with("vec3")) return;
+    metadata.insertMeta(GridBase::META_SAVE_HALF_FLOAT, openvdb::BoolMetadata(true));
+    if (const auto* numbers = dynamic_cast<const openvdb::FloatGrid*>(&grid))
+      metadata.insertMeta(background_key, openvdb::FloatMetadata(numbers->background()));
+  }
+
   openvdb::GridCPtrVec grids_;
   openvdb::MetaMap metadata_;
 };
@@ -74,6 +86,17 @@ void dropFileStatistics(GridBase& grid) {
     if (entry->first.starts_with("file_")) keys.push_back(entry->first);
   }
   for (const std::string& key : keys) grid.removeMeta(key);
+}
+
+/// A grid that was read from half floats is one of floats; whether it is written as such again is
+/// another matter.
+void dropHalf(GridBase& grid) {
+  if (!grid.saveFloatAsHalf()) return;
+  grid.setSaveFloatAsHalf(false);
+  const auto background = grid.getMetadata<openvdb::FloatMetadata>(background_key);
+  auto* numbers = dynamic_cast<openvdb::FloatGrid*>(&grid);
+  if (background && numbers) openvdb::tools::changeBackground(numbers->tree(), background->value());
+  grid.removeMeta(background_key);
 }
 
 VdbContents collected(const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
@@ -107,7 +130,10 @@ VdbContents readStream(std::istream& stream, const std::string& where) {
   try {
     openvdb::io::Stream archive(stream, false);
     const openvdb::GridPtrVecPtr grids = archive.getGrids();
-    for (const GridBase::Ptr& grid : *grids) dropFileStatistics(*grid);
+    for (const GridBase::Ptr& grid : *grids) {
+      dropFileStatistics(*grid);
+      dropHalf(*grid);
+    }
     return collected(*grids, *archive.getMetadata());
   } catch (const openvdb::Exception& error) {
     throw DataError(where + " is not a readable VDB archive: " + error.what());
@@ -239,7 +265,7 @@ void initializeVdb() { openvdb::initialize(); }
 
 std::string archiveBytes(const VdbContents& contents, VdbCodec codec) {
   std::ostringstream stream(std::ios::binary);
-  StreamArchive(contents, codec).writeTo(stream, false);
+  StreamArchive(contents, codec, false).writeTo(stream, false);
   std::string bytes = std::move(stream).str();
   ArchiveDigest digest;
   digest.update(bytes.data(), bytes.size());
@@ -248,7 +274,7 @@ std::string archiveBytes(const VdbContents& contents, VdbCodec codec) {
 }
 
 void writeVdb(const std::filesystem::path& path, const VdbContents& contents, VdbCodec codec,
-              const std::filesystem::path& shown) {
+              const std::filesystem::path& shown, bool as_half) {
   const auto failed = [&] {
     return DataError("cannot write " + quoted(shown) + ": " + std::strerror(errno ? errno : EIO));
   };
@@ -257,7 +283,7 @@ void writeVdb(const std::filesystem::path& path, const VdbContents& contents, Vd
     std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out | std::ios::trunc);
     if (!file) throw failed();
     file.exceptions(std::ios::badbit | std::ios::failbit);
-    StreamArchive(contents, codec).writeTo(file, true);
+    StreamArchive(contents, codec, as_half).writeTo(file, true);
     file.flush();
     file.exceptions(std::ios::badbit);
     file.seekg(0);

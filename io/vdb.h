@@ -30,8 +30,11 @@ void initializeVdb();
 /// contents give the same bytes: the archive's UUID, which OpenVDB draws by chance, is replaced by
 /// a digest of everything else and serves as the checksum. Throws DataError naming `shown` when the
 /// disk is full or the write fails otherwise.
+///
+/// `as_half`: numbers with fractions are rounded to 16 bits in the file, to three digits or so.
+/// Only the background, which says how far distances reach, stays as it is.
 void writeVdb(const std::filesystem::path& path, const VdbContents& contents, VdbCodec codec,
-              const std::filesystem::path& shown);
+              const std::filesystem::path& shown, bool as_half = false);
 
 /// Reads a whole archive and checks its digest where it carries one. Throws DataError naming
 /// `path`.

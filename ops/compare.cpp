@@ -30,12 +30,12 @@ class Compare : public Sink {
   }
 
   [[nodiscard]] std::string inputFile() const override {
+    if (paths_.size() > 2)
+      throw UsageError("file: two can be compared, not " + std::to_string(paths_.size()));
     return paths_.size() > 1 ? paths_.front() : "";
   }
 
   void plan(const Schema& in) override {
-    if (paths_.size() > 2)
-      throw UsageError("file: two can be compared, not " + std::to_string(paths_.size()));
     schema_ = in;
     other_ = std::make_unique<SlabReader>(paths_.back(), std::vector<std::string>());
     std::vector<std::string> names;
@@ -54,6 +54,12 @@ class Compare : public Sink {
   }
 
   [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
+
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    std::vector<std::string> names;
+    for (const auto& [name, finding] : findings_) names.push_back(name);
+    return names;
+  }
 
   void write(const Slab& in) override {
     const ZRange others = other_->schema().lattice.layers();
@@ -167,7 +173,8 @@ class Compare : public Sink {
 extern const OperatorInfo compare;
 const OperatorInfo compare{
     "compare", "Whether two .vdb hold the same voxels, and where not; exits with 1 where not",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! compare surface.vdb",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 -o surface.vdb\n"
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! compare surface.vdb",
     [] { return std::unique_ptr<Operator>(std::make_unique<Compare>()); }};
 
 }  // namespace vdbdither

@@ -143,7 +143,7 @@ class CsgOperator : public Filter {
 extern const OperatorInfo csg;
 const OperatorInfo csg{
     "csg", "Union, intersection or difference of two surfaces",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 --scale 0.6 -o core.vdb && vdbdither mesh2sdf "
+    "mesh2sdf part.stl --printer mimaki-3duj-553 --scale 0.6 -o core.vdb\nmesh2sdf "
     "part.stl --printer mimaki-3duj-553 ! csg --difference core.vdb -o rind.vdb",
     []() -> std::unique_ptr<Operator> { return std::make_unique<CsgOperator>(); }};
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 
@@ -38,11 +39,20 @@ class Dither : public Filter {
     options.text("mask", mask_, "blue|white|none|FILE.vdb",
                  "Thresholds: the installed blue noise, white noise, none (plain voxels), or a "
                  "tile of your own");
-    options.number("amplitude", amplitude_, 0, 8,
-                   "Half of it voxel diameters peak to peak, along the normal");
-    options.choice("at", at_, {"closest", "foot", "voxel"},
+    options.choice("preset", preset_, {"best", "paper"},
+                   "What 'preset' stands for below: adapted, voxel and walls; or the paper's 4, "
+                   "closest and none");
+    options.text("amplitude", amplitude_, "preset|adapted|N",
+                 "Half of it voxel diameters peak to peak, along the normal, up to 8; or adapted "
+                 "to each facet, by its normal and the spread");
+    options.choice("at", at_, {"preset", "closest", "foot", "voxel"},
                    "Where the mask is read: at the closest surface voxel, at the voxel of the foot "
                    "point, or at the voxel itself");
+    options.choice("guard", guard_, {"preset", "walls", "none"},
+                   "What is spared: walls and gaps too thin for the dither, or nothing");
+    options.length("spread", spread_mm_,
+                   "How far the printing process blurs, a standard deviation, for the adapted "
+                   "amplitude");
     options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the white noise");
     options.flag("displaced", displaced_,
                  "Adds the grid 'displaced', the displaced distances in mm");
@@ -54,11 +64,17 @@ class Dither : public Filter {
     if (has_normals_) findGrid<Vec3SGrid>(in.grids, "N");
 
     dither_.pitch_mm = in.lattice.pitch_mm;
-    dither_.amplitude = mask_ == "none" ? 0 : amplitude_;
-    dither_.at = at_ == "closest" ? DitherAt::closest
-                 : at_ == "foot"  ? DitherAt::foot
-                                  : DitherAt::voxel;
+    const bool best = preset_ == "best";
+    const auto chosen = [](const std::string& given, const std::string& by_preset) {
+      return given == "preset" ? by_preset : given;
+    };
+    const std::string at = chosen(at_, best ? "voxel" : "closest");
+    dither_.at = at == "closest" ? DitherAt::closest
+                 : at == "foot"  ? DitherAt::foot
+                                 : DitherAt::voxel;
+    dither_.guarded = chosen(guard_, best ? "walls" : "none") == "walls";
     dither_.mask = mask();
+    planAmplitude(chosen(amplitude_, best ? "adapted" : "4"));
     checkBand(surface->background());
 
     Schema out = in;
@@ -91,6 +107,27 @@ class Dither : public Filter {
   }
 
  private:
+  void planAmplitude(const std::string& text) {
+    dither_.adapted = nullptr;
+    if (mask_ == "none") {
+      dither_.amplitude = 0;
+    } else if (text == "adapted") {
+      if (!(spread_mm_ >= 0.01 && spread_mm_ <= 1))
+        throw UsageError("--spread: " + shortestText(spread_mm_) +
+                         " mm is not between 0.01 mm and 1 mm");
+      dither_.amplitude = 2;
+      dither_.adapted = std::make_shared<AdaptedAmplitude>(dither_.pitch_mm, spread_mm_);
+    } else {
+      double constant = -1;
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), constant);
+      if (error != std::errc() || end != text.data() + text.size() ||
+          !(constant >= 0 && constant <= 8))
+        throw UsageError("--amplitude: '" + text +
+                         "' is neither 'adapted' nor a number from 0 to 8");
+      dither_.amplitude = constant;
+    }
+  }
+
   [[nodiscard]] ThresholdMask mask() const {
     if (mask_ == "none") return ThresholdMask::constant(0.5F);
     if (mask_ == "white") return ThresholdMask::whiteNoise(static_cast<std::uint64_t>(seed_));
@@ -109,12 +146,16 @@ class Dither : public Filter {
     if (dither_.amplitude == 0 || band_mm * (1 + 1e-6) >= needed_mm) return;
     const auto text = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4) + " mm"; };
     throw DataError("grid 'surface' holds distances up to " + text(band_mm) + ", and --amplitude " +
-                    shortestText(amplitude_) + " on this lattice needs " + text(needed_mm));
+                    (dither_.adapted ? "adapted" : shortestText(dither_.amplitude)) +
+                    " on this lattice needs " + text(needed_mm));
   }
 
   std::string mask_ = "blue";
-  double amplitude_ = 4;
-  std::string at_ = "closest";
+  std::string preset_ = "best";
+  std::string amplitude_ = "preset";
+  std::string at_ = "preset";
+  std::string guard_ = "preset";
+  double spread_mm_ = 0.05;
   int seed_ = 1;
   bool displaced_ = false;
 

@@ -1,12 +1,13 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numbers>
+#include <numeric>
 
 #include "io/mesh_reader.h"
+#include "io/printer_profile.h"
 #include "io/target_lattice.h"
 #include "ops/kernels/held_band.h"
 #include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/mesh_placement.h"
 #include "ops/kernels/mesh_repair.h"
 #include "ops/kernels/part_index.h"
 #include "vdbdither/errors.h"
@@ -21,22 +22,6 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::Vec3d;
 
-constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{
-    {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}, {"um", 0.001}}};
-
-struct Bounds {
-  Vec3d min, max;
-};
-
-Bounds boundsOf(const Mesh& mesh) {
-  Bounds bounds{mesh.vertices.front(), mesh.vertices.front()};
-  for (const Vec3d& vertex : mesh.vertices) {
-    bounds.min = openvdb::math::minComponent(bounds.min, vertex);
-    bounds.max = openvdb::math::maxComponent(bounds.max, vertex);
-  }
-  return bounds;
-}
-
 /// `meshes` in one, one after the other.
 Mesh joined(std::vector<Mesh> meshes) {
   Mesh all = std::move(meshes.front());
@@ -47,25 +32,6 @@ Mesh joined(std::vector<Mesh> meshes) {
       all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   }
   return all;
-}
-
-/// Turns about the axes x, then y, then z; quarter turns are exact.
-void rotate(Mesh& mesh, const Vec3d& degrees) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const double turn = std::remainder(degrees[axis], 360.0);
-    if (turn == 0) continue;
-    const bool quarters = std::fmod(turn, 90.0) == 0;
-    const double angle = turn * std::numbers::pi / 180;
-    const double cosine = quarters ? std::round(std::cos(angle)) : std::cos(angle);
-    const double sine = quarters ? std::round(std::sin(angle)) : std::sin(angle);
-    const int u = (axis + 1) % 3;
-    const int v = (axis + 2) % 3;
-    for (Vec3d& p : mesh.vertices) {
-      const double turned = cosine * p[u] - sine * p[v];
-      p[v] = sine * p[u] + cosine * p[v];
-      p[u] = turned;
-    }
-  }
 }
 
 /// `surface` from triangle meshes.
@@ -100,14 +66,17 @@ class MeshToSdf : public Source {
     const Vec3d pitch_mm = targetPitchMm(printer_, pitch_, schema);
     band_ = bandFrom(band_text_);
     held_band_mm_ = band_.leastMm(pitch_mm);
-    auto mesh = std::make_shared<Mesh>(readMeshes());
-    placeMesh(*mesh);
-    schema.lattice = latticeAround(*mesh, pitch_mm);
+    Mesh mesh = readMeshes();
+    place(mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
+    questionSize(mesh, schema);
+    schema.lattice = latticeAround(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
-    planParts(*mesh, lattice);
-    repair(*mesh);
-    schema.leaves_per_row = leavesPerRow(*mesh, lattice);
-    field_ = std::make_unique<MeshDistance>(std::move(mesh), lattice, band_, extras_);
+    planParts(mesh, lattice);
+    const SwallowedWalls walls = repair(mesh);
+    const std::vector<double> leaves = leavesOfRows(mesh, lattice);
+    schema.leaves_per_row = *std::max_element(leaves.begin(), leaves.end());
+    schema.leaves = std::accumulate(leaves.begin(), leaves.end(), 0.0);
+    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, walls);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
@@ -135,7 +104,8 @@ class MeshToSdf : public Source {
     return diameters ? Band{size, 0} : Band{0, size};
   }
 
-  void repair(Mesh& mesh) const {
+  /// Makes the mesh bound a solid and finds what of it is no surface of that.
+  SwallowedWalls repair(Mesh& mesh) const {
     MeshRepairs repairs;
     mesh = repaired(std::move(mesh), repairs);
     if (mesh.triangles.empty())
@@ -145,6 +115,9 @@ class MeshToSdf : public Source {
       throw DataError("the triangles enclose nothing: " + std::to_string(repairs.boundary_edges) +
                       " of their " + std::to_string(sides) +
                       " sides meet no other; join them in a mesh editor first");
+    SwallowedWalls walls = swallowedWalls(mesh);
+    repairs.swallowed_triangles = walls.swallowed;
+    repairs.cut_triangles = walls.cut;
     const std::vector<std::string> lines = repairs.lines();
     if (strict_ && !lines.empty())
       throw DataError("the mesh needs repair, which --strict forbids: " + lines.front() +
@@ -157,6 +130,9 @@ class MeshToSdf : public Source {
     report().count("turned_parts", static_cast<double>(repairs.turned_parts));
     report().count("boundary_edges", static_cast<double>(repairs.boundary_edges));
     report().count("closed_holes", static_cast<double>(repairs.closed_holes));
+    report().count("swallowed_triangles", static_cast<double>(repairs.swallowed_triangles));
+    report().count("cut_triangles", static_cast<double>(repairs.cut_triangles));
+    return walls;
   }
 
   Mesh readMeshes() {
@@ -177,34 +153,62 @@ class MeshToSdf : public Source {
       const auto begin = all.triangles.begin() + static_cast<std::ptrdiff_t>(first);
       part.triangles.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
       MeshRepairs repairs;
-      parts_.emplace_back(std::make_shared<Mesh>(repaired(std::move(part), repairs)), lattice,
-                          band_);
+      part = repaired(std::move(part), repairs);
+      parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
       first += count;
     }
   }
 
-  void placeMesh(Mesh& mesh) const {
-    const auto unit = std::find_if(units_mm.begin(), units_mm.end(),
-                                   [this](const auto& known) { return known.first == unit_; });
-    double factor = unit->second * scale_;
-    rotate(mesh, rotate_);
-    if (fit_mm_ > 0) {
-      const Bounds bounds = boundsOf(mesh);
-      const Vec3d extent = bounds.max - bounds.min;
-      const double longest = std::max({extent.x(), extent.y(), extent.z()});
-      if (!(longest > 0)) throw DataError("--fit: the mesh has no extent");
-      factor = fit_mm_ / longest;
+  /// Warns of a part that is hardly meant to be as large or as small as it is.
+  void questionSize(const Mesh& mesh, const Schema& schema) const {
+    // 3 m and 0.1 mm, as far as floats of a file tell.
+    constexpr double largest_mm = 3000 * (1 - 1e-6);
+    constexpr double least_mm = 0.1 * (1 + 1e-6);
+    const auto profile = schema.metadata.find("vdbdither:printer");
+    const Vec3d build_mm = profile == schema.metadata.end()
+                               ? Vec3d(0.0)
+                               : printerProfileFromJson(profile->second).build_mm;
+    const MeshBounds bounds = boundsOf(mesh);
+    const Vec3d size_mm = bounds.max - bounds.min;
+    const double longest_mm = std::max({size_mm.x(), size_mm.y(), size_mm.z()});
+    const auto rounded = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4); };
+    const std::string is = "the part is " + rounded(size_mm.x()) + " x " + rounded(size_mm.y()) +
+                           " x " + rounded(size_mm.z()) + " mm";
+    if (longest_mm >= largest_mm || (longest_mm > 0 && longest_mm <= least_mm)) {
+      report().warn(is + "; " + likelierUnit(longest_mm));
+    } else if (build_mm != Vec3d(0, 0, 0) &&
+               (size_mm.x() > build_mm.x() || size_mm.y() > build_mm.y() ||
+                size_mm.z() > build_mm.z())) {
+      report().warn(is + ", more than the " + rounded(build_mm.x()) + " x " +
+                    rounded(build_mm.y()) + " x " + rounded(build_mm.z()) +
+                    " mm that the printer builds; turn it with --rotate, or see --unit and --fit");
     }
-    for (Vec3d& vertex : mesh.vertices) vertex *= factor;
-    if (!place_) return;
-    const Vec3d corner = boundsOf(mesh).min;
-    for (Vec3d& vertex : mesh.vertices) vertex -= corner;
+  }
+
+  /// Of the other units the one that brings the part nearest to the size of a hand.
+  [[nodiscard]] std::string likelierUnit(double longest_mm) const {
+    constexpr double hand_mm = 100;
+    std::string_view likelier;
+    double best_mm = 0;
+    for (const auto& [name, factor] : units_mm) {
+      const double mm = longest_mm / unitMm(unit_) * factor;
+      const bool nearer =
+          best_mm == 0 || std::abs(std::log(mm / hand_mm)) < std::abs(std::log(best_mm / hand_mm));
+      if ((mm < longest_mm) == (longest_mm > hand_mm) && mm != longest_mm && nearer) {
+        likelier = name;
+        best_mm = mm;
+      }
+    }
+    if (likelier.empty() || fit_mm_ > 0) return "is that meant?";
+    const std::string unit(likelier);
+    return "are the file's numbers " + unit + "? --unit " + unit + " makes its longest side " +
+           shortestText(std::round(best_mm * 100) / 100) + " mm";
   }
 
   /// The voxels within a voxel diagonal, or the band, of the mesh's bounding box; where y is
   /// refined, the same region in finer voxels.
   Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm) const {
-    const Bounds bounds = boundsOf(mesh);
+    const MeshBounds bounds = boundsOf(mesh);
     const double margin_mm = std::max(pitch_mm.length(), band_.greatestMm(pitch_mm));
     for (int axis = 0; axis < 3; ++axis) {
       const double furthest_mm =
@@ -229,7 +233,7 @@ class MeshToSdf : public Source {
 
   /// Every leaf that the band meets, spread by the area of the surface over the rows that it
   /// crosses.
-  double leavesPerRow(const Mesh& mesh, const Lattice& lattice) const {
+  std::vector<double> leavesOfRows(const Mesh& mesh, const Lattice& lattice) const {
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
     const auto rows = static_cast<std::size_t>(lattice.layers().size() / leaf_layers + 2);
     const double low = lattice.layers().begin * lattice.pitch_mm.z();
@@ -253,7 +257,7 @@ class MeshToSdf : public Source {
       for (std::size_t row = first; row <= last; ++row)
         leaves[row] += touched / static_cast<double>(last - first + 1);
     }
-    return *std::max_element(leaves.begin(), leaves.end());
+    return leaves;
   }
 
   [[nodiscard]] Grids gridsOf(const DistanceGrids& made) const {

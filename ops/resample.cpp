@@ -257,7 +257,7 @@ class Resample : public Source {
 extern const OperatorInfo resample;
 const OperatorInfo resample{
     "resample", "Signed distance in mm from a level set or fog volume of any tool",
-    "mesh2sdf part.stl --pitch 50um,50um,50um -o cubes.vdb && vdbdither resample cubes.vdb "
+    "mesh2sdf part.stl --pitch 50um,50um,50um -o cubes.vdb\nresample cubes.vdb "
     "--printer mimaki-3duj-553 -o surface.vdb",
     []() -> std::unique_ptr<Operator> { return std::make_unique<Resample>(); }};
 

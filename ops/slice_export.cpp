@@ -14,8 +14,9 @@
 #include "io/material_table.h"
 #include "io/png_runs.h"
 #include "io/slice_runs.h"
+#include "io/stack_files.h"
 #include "io/stack_preview.h"
-#include "io/staged_output.h"
+#include "io/tiff.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/find_grid.h"
 #include "vdbdither/openvdb.h"
@@ -52,13 +53,14 @@ struct LayerOutput {
 class SliceExport : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("folder", folder_, "Folder that will hold the stack");
-    options.choice("format", format_, {"png", "png1", "png8", "exr"},
-                   "png: 32-bit RGBA in the colours of the materials. png1: a stack of 1 bit a "
-                   "voxel for each material, in a folder "
-                   "of its own. png8: grey, 255 where printed, else 0. exr: material index, and "
-                   "distance and normal where "
-                   "they are there");
+    options.positional("folder", folder_,
+                       "Folder that will hold the stack, or a zip archive: NAME.zip");
+    options.choice(
+        "format", format_, {"png", "png1", "png8", "tiff", "tiff1", "exr"},
+        "png: 32-bit RGBA in the colours of the materials. png1, tiff1: a stack of 1 bit "
+        "a voxel for each material, in a folder of its own. png8: grey, 255 where "
+        "printed, else 0. tiff: a palette of the colours. exr: material index, and "
+        "distance and normal where they are there");
     options.text("prefix", prefix_, "TEXT", "What the file names begin with");
     options.integer("digits", digits_, 1, 9, "Digits of the running number, zeros in front");
     options.integer("first", first_, 0, 1000000, "Number of the lowest layer");
@@ -69,7 +71,13 @@ class SliceExport : public Sink {
                  "Mirror top to bottom. By default a slice is seen from above: the top row has the "
                  "greatest y");
     options.text("background", background_, "COLOUR",
-                 "Colour of what is not printed, in png: #rrggbb, or r,g,b,a of 0 to 255");
+                 "Colour of what is not printed, in png and tiff: #rrggbb, or r,g,b,a of 0 to 255");
+    options.choice(
+        "exr-packing", exr_packing_, {"none", "rle", "zips", "zip", "piz"},
+        "How exr is packed, always without loss: zips and rle by rows, zip by 16 and piz "
+        "by 32 of them");
+    options.integer("exr-tile", exr_tile_, 0, 4096, "Edge of the tiles of exr; 0 makes rows");
+    options.flag("exr-half", exr_half_, "Distances in exr take 16 bits in place of 32");
     options.flag("overwrite", overwrite_, "Replace a stack that is there already");
   }
 
@@ -79,16 +87,12 @@ class SliceExport : public Sink {
       throw DataError("there is nothing to slice: the lattice has no voxels");
     planMaterials();
     planColours();
+    if (format_ == "tiff" && materials_.size() > 255)
+      throw UsageError("--format: tiff has room for 255 materials, and there are " +
+                       std::to_string(materials_.size()) + "; take exr");
     if (prefix_.find('/') != std::string::npos)
       throw UsageError("--prefix: '" + prefix_ + "' must not hold a '/'");
-    StagedOutput::check(folder_, StagedOutput::Kind::folder, overwrite_);
-    const std::filesystem::path folder = folder_;
-    if (std::filesystem::exists(folder) && !std::filesystem::is_empty(folder) &&
-        !std::filesystem::exists(folder / "manifest.json")) {
-      throw UsageError("'" + folder_ +
-                       "' holds no manifest.json, so it is no stack of slices to overwrite; name "
-                       "another folder");
-    }
+    StackOutput::check(folder_, overwrite_);
     frame_ = {in.lattice.box, padding_, flip_x_, flip_y_};
     if (in.lattice.box.dim().x() + std::int64_t{2} * padding_ > 1 << 24 ||
         in.lattice.box.dim().y() + std::int64_t{2} * padding_ > 1 << 24) {
@@ -102,8 +106,26 @@ class SliceExport : public Sink {
     voxels_.assign(materials_.size() + 1, 0);
   }
 
+  [[nodiscard]] OutputEstimate output() const override {
+    // Measured on dithered spheres, per leaf at the surface and per slice. A file of a folder
+    // wastes half a block of the disk.
+    const double stacks = oneStackEach() ? static_cast<double>(materials_.size()) : 1;
+    const double per_leaf = format_ == "png"    ? 125
+                            : format_ == "tiff" ? 250
+                            : format_ == "exr"  ? 1300
+                                                : 80 * stacks;
+    const double per_slice = 500 + (folder_.ends_with(".zip") ? 0 : 2048 * stacks);
+    return {folder_, schema_.leaves * per_leaf + schema_.lattice.layers().size() * per_slice};
+  }
+
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    std::vector<std::string> names{source_};
+    if (format_ == "exr") names.insert(names.end(), {"surface", "N"});
+    return names;
+  }
+
   void write(const Slab& in) override {
-    if (!staged_) staged_.emplace(folder_, StagedOutput::Kind::folder);
+    if (!stack_) stack_.emplace(folder_);
     const int together =
         leaf_layers * ((tbb::this_task_arena::max_concurrency() + leaf_layers - 1) / leaf_layers);
     for (int z = in.core.begin; z < in.core.end;) {
@@ -115,13 +137,13 @@ class SliceExport : public Sink {
   }
 
   void finish() override {
-    if (!staged_) throw DataError("no layer came to slice");
-    staged_->write("preview.png", encodePng(preview_->picture(), {}));
+    if (!stack_) throw DataError("no layer came to slice");
+    stack_->write("preview.png", encodePng(preview_->picture(), {}));
     const std::string manifest = manifestText();
-    staged_->write("manifest.json",
-                   {reinterpret_cast<const std::uint8_t*>(manifest.data()), manifest.size()});
-    staged_->commit();
-    staged_.reset();
+    stack_->write(manifest_name,
+                  {reinterpret_cast<const std::uint8_t*>(manifest.data()), manifest.size()});
+    stack_->commit();
+    stack_.reset();
     report().count("slices", static_cast<double>(last_layer_ - first_layer_ + 1));
     for (std::size_t i = 0; i < materials_.size(); ++i) {
       report().count("voxels of " + materials_[i].name, static_cast<double>(voxels_[i + 1]));
@@ -129,6 +151,8 @@ class SliceExport : public Sink {
   }
 
  private:
+  [[nodiscard]] bool oneStackEach() const { return format_ == "png1" || format_ == "tiff1"; }
+
   void planMaterials() {
     if (schema_.grids.contains("material")) {
       findGrid<openvdb::Int32Grid>(schema_.grids, "material");
@@ -160,7 +184,7 @@ class SliceExport : public Sink {
     palette_ = {pixel(background_rgba_)};
     for (const Material& material : materials_) {
       palette_.push_back(pixel(material.rgba));
-      if (format_ == "png" && palette_.back() == palette_.front()) {
+      if ((format_ == "png" || format_ == "tiff") && palette_.back() == palette_.front()) {
         throw UsageError("--background: the material '" + material.name + "' has the colour " +
                          background_ + "; choose another");
       }
@@ -169,10 +193,11 @@ class SliceExport : public Sink {
 
   /// Channels of exr, and the grids behind them.
   void planChannels() {
-    channels_ = {{"material", true}};
+    constexpr std::size_t most_in_half = 2048;
+    channels_ = {{"material", materials_.size() <= most_in_half}};
     if (schema_.grids.contains("surface")) {
       findGrid<openvdb::FloatGrid>(schema_.grids, "surface");
-      channels_.push_back({"distance", false});
+      channels_.push_back({"distance", exr_half_});
     }
     if (schema_.grids.contains("N")) {
       findGrid<openvdb::Vec3SGrid>(schema_.grids, "N");
@@ -244,14 +269,24 @@ class SliceExport : public Sink {
     const openvdb::Vec3d& pitch = schema_.lattice.pitch_mm;
     if (format_ == "exr") {
       layer.files.push_back({fileName(layer.z, ".exr"), "", encodeChannels(in, layer), ""});
-    } else if (format_ == "png1") {
+    } else if (format_ == "tiff") {
+      layer.files.push_back({fileName(layer.z, ".tif"), "",
+                             encodeTiff(layer.image, {palette_, pitch.x(), pitch.y()}), ""});
+    } else if (oneStackEach()) {
       for (std::size_t i = 1; i <= materials_.size(); ++i) {
         std::vector<std::uint32_t> only(materials_.size() + 1, 0);
         only[i] = 1;
         const std::string& name = materials_[i - 1].name;
-        layer.files.push_back(
-            {name + "/" + fileName(layer.z, ".png"), name,
-             encodePng(layer.image, {PngPixels::grey1, only, pitch.x(), pitch.y()}), ""});
+        if (format_ == "tiff1") {
+          layer.files.push_back({name + "/" + fileName(layer.z, ".tif"), name,
+                                 encodeTiff(masked(layer.image, static_cast<std::uint32_t>(i)),
+                                            {{}, pitch.x(), pitch.y()}),
+                                 ""});
+        } else {
+          layer.files.push_back(
+              {name + "/" + fileName(layer.z, ".png"), name,
+               encodePng(layer.image, {PngPixels::grey1, only, pitch.x(), pitch.y()}), ""});
+        }
       }
     } else if (format_ == "png8") {
       std::vector<std::uint32_t> grey(materials_.size() + 1, 255);
@@ -264,6 +299,12 @@ class SliceExport : public Sink {
           {fileName(layer.z, ".png"), "",
            encodePng(layer.image, {PngPixels::rgba8, palette_, pitch.x(), pitch.y()}), ""});
     }
+  }
+
+  /// 1 where `image` has this value, else 0.
+  static RunImage masked(RunImage image, std::uint32_t value) {
+    for (Run& run : image.runs) run.value = run.value == value ? 1 : 0;
+    return image;
   }
 
   [[nodiscard]] Bytes encodeChannels(const Slab& in, const LayerOutput& layer) const {
@@ -298,8 +339,14 @@ class SliceExport : public Sink {
                  [axis](const openvdb::Vec3s& normal) { return normal[axis]; });
       }
     };
-    return encodeExr(frame_.width(), frame_.height(),
-                     schema_.lattice.pitch_mm.x() / schema_.lattice.pitch_mm.y(), channels_, fill);
+    const ExrFormat format{schema_.lattice.pitch_mm.x() / schema_.lattice.pitch_mm.y(),
+                           exr_packing_ == "none"   ? ExrPacking::none
+                           : exr_packing_ == "rle"  ? ExrPacking::rle
+                           : exr_packing_ == "zips" ? ExrPacking::zips
+                           : exr_packing_ == "zip"  ? ExrPacking::zip
+                                                    : ExrPacking::piz,
+                           exr_tile_};
+    return encodeExr(frame_.width(), frame_.height(), format, channels_, fill);
   }
 
   void storeLayer(LayerOutput& layer) {
@@ -310,7 +357,7 @@ class SliceExport : public Sink {
     if (slices_.empty()) first_layer_ = layer.z;
     last_layer_ = layer.z;
     for (const SliceFile& file : layer.files) {
-      staged_->write(file.name, file.bytes);
+      stack_->write(file.name, file.bytes);
       ordered_json entry = {{"layer", layer.z}, {"file", file.name}, {"sha256", file.sha256}};
       if (!file.material.empty()) entry["material"] = file.material;
       slices_.push_back(std::move(entry));
@@ -335,6 +382,7 @@ class SliceExport : public Sink {
     const ordered_json printer = ordered_json::parse(metadata("vdbdither:printer"), nullptr, false);
     manifest["printer"] = printer.is_discarded() ? ordered_json() : printer;
     manifest["format"] = format_;
+    manifest["grid"] = source_;
     manifest["pitch_mm"] = triple(lattice.pitch_mm);
     manifest["origin_mm"] = triple(lattice.origin_mm);
     manifest["size"] = {frame_.width(), frame_.height(), last_layer_ - first_layer_ + 1};
@@ -369,6 +417,9 @@ class SliceExport : public Sink {
   bool flip_x_ = false;
   bool flip_y_ = false;
   std::string background_ = "0,0,0,255";
+  std::string exr_packing_ = "zips";
+  int exr_tile_ = 0;
+  bool exr_half_ = false;
   bool overwrite_ = false;
 
   Schema schema_;
@@ -379,7 +430,7 @@ class SliceExport : public Sink {
   std::vector<std::uint32_t> palette_;  ///< per material index; 0 is the background
   std::vector<ExrChannel> channels_;
 
-  std::optional<StagedOutput> staged_;
+  std::optional<StackOutput> stack_;
   std::optional<StackPreview> preview_;
   ordered_json slices_ = ordered_json::array();
   std::vector<std::uint64_t> voxels_;

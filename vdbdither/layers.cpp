@@ -146,4 +146,12 @@ GridSize sizeOf(const GridConstPtr& grid) {
   return {static_cast<double>(grid->memUsage()), static_cast<double>(grid->activeVoxelCount())};
 }
 
+double leafBytes(const GridConstPtr& grid) {
+  constexpr double overhead_bytes = 128;
+  const std::string type = grid->valueType();
+  if (type == "bool" || type == "mask") return 64 + overhead_bytes;
+  const double component = type.ends_with("d") || type == "int64" || type == "double" ? 8 : 4;
+  return 512 * component * (type.starts_with("vec3") ? 3 : 1) + overhead_bytes;
+}
+
 }  // namespace vdbdither

@@ -31,4 +31,7 @@ struct GridSize {
 };
 GridSize sizeOf(const GridConstPtr& grid);
 
+/// Bytes that a leaf node of `grid` takes in memory.
+double leafBytes(const GridConstPtr& grid);
+
 }  // namespace vdbdither

@@ -3,10 +3,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <malloc.h>
 #include <new>
 
 #include <nlohmann/json.hpp>
 
+#include "commands/command.h"
+#include "commands/manual.h"
 #include "io/standard_streams.h"
 #include "io/vdb.h"
 #include "vdbdither/chain.h"
@@ -20,34 +23,43 @@
 namespace vdbdither {
 namespace {
 
-std::string overview() {
-  std::string text =
-      "vdbdither: shape dithering for voxel-controlled 3D printing\n\n"
-      "Usage: vdbdither OPERATOR [arguments] [! OPERATOR [arguments] ...]\n"
-      "       vdbdither run \"OPERATOR ... | OPERATOR ...\"\n"
-      "       vdbdither help [OPERATOR]\n\nOperators:\n";
-  for (const OperatorInfo* info : registeredOperators()) {
-    text += "  " + std::string(info->name) +
-            std::string(18 - std::min<std::size_t>(17, info->name.size()), ' ') +
-            std::string(info->summary) + "\n";
-  }
-  return text +
-         "\nOperators read and write .vdb: -i and -o name files, pipes carry slabs, ! joins "
-         "operators in one process.\n"
-         "Example:\n"
-         "  vdbdither mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign ! "
-         "slice-export out\n";
+/// What `help` says of a verb, or of all.
+std::string helpOn(const std::string& verb) {
+  if (verb == "all") return listing();
+  if (const CommandInfo* command = findCommand(verb)) return helpText(pageOf(*command));
+  return helpText(pageOf(findOperator(verb)));
 }
 
-std::string helpOf(const OperatorInfo& info) {
-  const std::unique_ptr<Operator> made = info.make();
-  Options options;
-  made->declare(options);
-  RunOptions run;
-  Options run_options;
-  run.declare(run_options);
-  return options.help(std::string(info.name), std::string(info.summary), std::string(info.example),
-                      run_options);
+bool asksForHelp(const std::vector<std::string>& words) {
+  return std::any_of(words.begin(), words.end(),
+                     [](const std::string& word) { return word == "--help" || word == "-h"; });
+}
+
+void runCommand(const CommandInfo& info, const std::vector<std::string>& arguments) {
+  if (asksForHelp(arguments)) return printData(helpText(pageOf(info)).c_str());
+  try {
+    const std::unique_ptr<Command> command = info.make();
+    Options options;
+    command->declare(options);
+    options.parse(arguments);
+    command->run();
+  } catch (const UsageError& error) {
+    throw UsageError(std::string(info.name) + ": " + error.what());
+  } catch (const DataError& error) {
+    throw DataError(std::string(info.name) + ": " + error.what());
+  }
+}
+
+/// Whether a word that is no operator was rather meant to be a command.
+void refuseNearCommand(const std::string& word) {
+  std::vector<std::string> names;
+  for (const OperatorInfo* info : registeredOperators()) names.emplace_back(info->name);
+  for (const CommandInfo* info : commands()) {
+    if (!info->hidden) names.emplace_back(info->name);
+  }
+  const std::string near = nearestWord(word, names);
+  if (word != near && findCommand(near))
+    throw UsageError("no operator or command '" + word + "'; did you mean '" + near + "'?");
 }
 
 /// The words of the chain: the arguments themselves, or the line after `run`; behind a link named
@@ -87,12 +99,13 @@ std::string reportJson(const Pipeline& pipeline, double seconds) {
 
 void printStages(const Pipeline& pipeline, double seconds) {
   for (const StageReport& stage : pipeline.reports()) {
-    std::fprintf(stderr, "%-16s %8.2f s  %12.0f voxels  %8s out  %8s peak\n", stage.name.c_str(),
+    std::fprintf(stderr, "%-16s %8.2f s  %12.0f voxels  %8s out  %8s peak", stage.name.c_str(),
                  stage.seconds, stage.active_voxels, bytesText(stage.bytes).c_str(),
                  bytesText(stage.peak_memory_bytes).c_str());
     for (const auto& [name, value] : stage.counts) {
-      std::fprintf(stderr, "  %s %s\n", name.c_str(), shortestText(value).c_str());
+      std::fprintf(stderr, "  %s %s", name.c_str(), shortestText(value).c_str());
     }
+    std::fputc('\n', stderr);
   }
   std::fprintf(stderr, "%-16s %8.2f s  %8.0f Mvoxel/s of the box\n", "all", seconds,
                pipeline.boxVoxels() / seconds / 1e6);
@@ -119,7 +132,8 @@ class ProgramConsole : public Console {
 void runChain(const std::vector<std::string>& words) {
   Pipeline pipeline(parseChain(words));
   const RunOptions& options = pipeline.options();
-  if (const OperatorInfo* info = pipeline.helpWanted()) return printData(helpOf(*info).c_str());
+  if (const OperatorInfo* info = pipeline.helpWanted())
+    return printData(helpText(pageOf(*info)).c_str());
   ProgramConsole console(pipeline.writesToStandardOutput());
   console.begin(options.quiet, 0);
   const auto start = std::chrono::steady_clock::now();
@@ -145,9 +159,11 @@ void runProgram(int argc, char** argv) {
   if (std::find(words.begin(), words.end(), "--version") != words.end())
     return printData((std::string("vdbdither ") + version + "\n").c_str());
   if (words.front() == "--help" || words.front() == "-h" || words.front() == "help") {
-    return printData(words.size() > 1 ? helpOf(findOperator(words[1])).c_str()
-                                      : overview().c_str());
+    return printData(words.size() > 1 ? helpOn(words[1]).c_str() : overview().c_str());
   }
+  if (const CommandInfo* command = findCommand(words.front()))
+    return runCommand(*command, {words.begin() + 1, words.end()});
+  refuseNearCommand(words.front());
   runChain(words);
 }
 
@@ -156,6 +172,9 @@ int guardedMain(int argc, char** argv) {
     std::fprintf(stderr, "vdbdither %s\n", message);
     return code;
   };
+  // What one slab frees the next one wants again: giving it back to the system in between takes
+  // twice the system time.
+  mallopt(M_TRIM_THRESHOLD, 256 << 20);
   try {
     setStandardOutputAside();
     noteInterrupts();

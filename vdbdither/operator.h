@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -90,15 +91,31 @@ class Filter : public Operator {
   [[nodiscard]] virtual Grids run(const Slab& in) const = 0;
 };
 
+/// What a sink will put on a disk.
+struct OutputEstimate {
+  std::string path;  ///< empty: nothing, or not on a disk
+  double bytes = 0;  ///< about; 0 where unknown
+};
+
 /// Takes slabs in rising z. In the middle of a chain it sees the slabs and they pass on.
 class Sink : public Operator {
  public:
   virtual void plan(const Schema& in) = 0;
+  /// The names of the grids it looks at, where it does not look at all of them: grids that nobody
+  /// looks at any more are let go early. Asked after `plan`.
+  [[nodiscard]] virtual std::optional<std::vector<std::string>> reads() const {
+    return std::nullopt;
+  }
   virtual void write(const Slab& in) = 0;
   /// Publishes. Before it returns, nothing exists under the name that the user gave.
   virtual void finish() = 0;
+  /// Asked after `plan`.
+  [[nodiscard]] virtual OutputEstimate output() const { return {}; }
   /// Whether the voxels leave by standard output. Asked once the options are read.
   [[nodiscard]] virtual bool writesToStandardOutput() const { return false; }
+  /// Whether it works on files that it names itself and no slab is to come: it is then planned with
+  /// an empty schema, finished, and the whole of its chain. Asked once the options are read.
+  [[nodiscard]] virtual bool standsAlone() const { return false; }
 };
 
 /// What the registry holds of an operator: `extern const OperatorInfo material_assign` in
@@ -106,8 +123,8 @@ class Sink : public Operator {
 struct OperatorInfo {
   std::string_view name;     ///< the verb, kebab-case
   std::string_view summary;  ///< one sentence, no full stop
-  /// A whole chain that runs in a folder with a `part.stl`; others that it needs first come before,
-  /// as in a shell: `… && vdbdither …`.
+  /// A whole chain that runs in a folder with a `part.stl`, or several, a line each, of which the
+  /// last shows the verb.
   std::string_view example;
   std::unique_ptr<Operator> (*make)();
   /// Moves grids without changing them (read, write): leaves no line in the history.

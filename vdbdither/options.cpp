@@ -302,7 +302,12 @@ void Options::parse(std::span<const std::string> arguments, const Options& commo
     return;
   }
   const std::string& extra = extras.front();
-  if (!extra.starts_with('-')) throw UsageError("unexpected argument '" + extra + "'; see --help");
+  if (!extra.starts_with('-')) {
+    throw UsageError("unexpected argument '" + extra + "'; " +
+                     (extra.ends_with(".vdb") && common.find("input")
+                          ? "-i " + extra + " reads it, -o " + extra + " writes it"
+                          : "see --help"));
+  }
   const std::string option_name = extra.substr(0, extra.find('='));
   const std::string near = nearestWord(option_name, names);
   throw UsageError("no option '" + option_name + "'; " +
@@ -317,7 +322,12 @@ std::string Options::help(const std::string& verb, const std::string& summary,
   for (const Option& option : common.options_) {
     if (!find(option.name)) addTo(app, option, "Options of every operator");
   }
-  if (!example.empty()) app.footer("Example:\n  vdbdither " + example);
+  if (!example.empty()) {
+    std::string footer = "Example:\n  vdbdither ";
+    for (const char c : example)
+      footer += c == '\n' ? std::string("\n  vdbdither ") : std::string(1, c);
+    app.footer(footer);
+  }
   app.get_formatter()->column_width(34);
   return app.help();
 }

@@ -60,7 +60,7 @@ class Options {
   void parse(std::span<const std::string> arguments, const Options& common = {}) const;
 
   /// The text of --help: usage, the options with their defaults, the common ones in a group of
-  /// their own.
+  /// their own, the lines of the example.
   [[nodiscard]] std::string help(const std::string& verb, const std::string& summary,
                                  const std::string& example, const Options& common) const;
 

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <mutex>
+#include <set>
 #include <sstream>
 #include <sys/resource.h>
 
@@ -43,19 +45,20 @@ auto inStage(const std::string& name, const Function& function) {
   }
 }
 
-double bytesPerVoxel(const openvdb::GridBase& grid) {
-  const std::string type = grid.valueType();
-  if (type == "bool" || type == "mask") return 0.125;
-  const double component = type.ends_with("d") || type == "int64" || type == "double" ? 8 : 4;
-  return type.starts_with("vec3") ? 3 * component : component;
+using Names = std::set<std::string, std::less<>>;
+
+Names namesOf(const Schema& schema) {
+  Names names;
+  for (const auto& [name, grid] : schema.grids) names.insert(name);
+  return names;
 }
 
-/// What the leaves of one row (eight layers) of all grids take.
-double bytesPerRow(const Schema& schema) {
-  constexpr double leaf_overhead_bytes = 128;
+/// What the leaves of one row (eight layers) of some grids take.
+double bytesPerRow(const Schema& schema, const Names& names) {
   double bytes = 0;
-  for (const auto& [name, grid] : schema.grids)
-    bytes += 512 * bytesPerVoxel(*grid) + leaf_overhead_bytes;
+  for (const auto& [name, grid] : schema.grids) {
+    if (names.contains(name)) bytes += leafBytes(grid);
+  }
   return bytes * schema.leaves_per_row;
 }
 
@@ -100,6 +103,15 @@ double availableMemoryBytes() {
     if (key == "MemAvailable:") return kilobytes * 1024;
   }
   return std::numeric_limits<double>::infinity();
+}
+
+/// What is left where `path` is to be; infinite where that cannot be told.
+double freeDiskBytes(const std::string& path) {
+  std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (folder.empty()) folder = ".";
+  std::error_code error;
+  const std::filesystem::space_info space = std::filesystem::space(folder, error);
+  return error ? std::numeric_limits<double>::infinity() : static_cast<double>(space.available);
 }
 
 }  // namespace
@@ -183,9 +195,11 @@ class Pipeline::Stage : public Reporter {
     }
   }
 
-  /// Grids that the schema promises and nobody made are empty.
-  void complete(Grids& grids) const {
+  /// Of the grids made, and of those that the schema promises and nobody made, which are empty:
+  /// what a later stage looks at.
+  void handOn(Grids& grids) const {
     for (const auto& [grid_name, prototype] : out_.grids) grids.try_emplace(grid_name, prototype);
+    std::erase_if(grids, [&](const auto& grid) { return !handed_on.contains(grid.first); });
   }
 
   [[nodiscard]] std::string name() const { return std::string(info_.name); }
@@ -196,16 +210,20 @@ class Pipeline::Stage : public Reporter {
   [[nodiscard]] const std::vector<Read>& reads() const { return reads_; }
   [[nodiscard]] bool isBarrier() const { return operator_->isBarrier() || widest(reads_).whole; }
   [[nodiscard]] double memoryBytes() const { return operator_->memoryBytes(); }
-  [[nodiscard]] std::string inputFile() const { return operator_->inputFile(); }
+  [[nodiscard]] std::string inputFile() const {
+    return inStage(name(), [&] { return operator_->inputFile(); });
+  }
   [[nodiscard]] Source* source() const { return dynamic_cast<Source*>(operator_.get()); }
   [[nodiscard]] Filter* filter() const { return dynamic_cast<Filter*>(operator_.get()); }
   [[nodiscard]] Sink* sink() const { return dynamic_cast<Sink*>(operator_.get()); }
+  [[nodiscard]] bool standsAlone() const { return sink() && sink()->standsAlone(); }
 
   Watcher* watcher = nullptr;
   ZRange cores;   ///< the layers this stage is to give out
   ZRange coming;  ///< of a filter: what the stage before gives
   ZRange layers;  ///< and with it the layers of its own that are empty there
   int next_layer = 0;
+  Names handed_on;  ///< the grids that a later stage looks at
   std::optional<Window> window;
   int done_layers = 0;
   int total_layers = 0;
@@ -225,6 +243,11 @@ Pipeline::Pipeline(const std::vector<Step>& steps) {
   for (const Step& step : steps) {
     addStage(step);
     if (help_) return;
+  }
+  if (standsAlone()) {
+    if (!options_.input.empty() || !options_.output.empty())
+      throw UsageError(stages_.front()->name() + ": names its own files, not --input or --output");
+    return;
   }
   if (!stages_.front()->source()) {
     std::vector<std::string> arguments;
@@ -272,8 +295,14 @@ void Pipeline::addStage(const Step& step) {
     throw UsageError(stage->name() + ": takes what comes to it and cannot read '" + file +
                      "' as well");
   }
+  if (!stages_.empty() && (stage->standsAlone() || standsAlone())) {
+    const std::string alone = stage->standsAlone() ? stage->name() : stages_.front()->name();
+    throw UsageError(alone + ": works on the files it names and is no part of a chain then");
+  }
   stages_.push_back(std::move(stage));
 }
+
+bool Pipeline::standsAlone() const { return stages_.front()->standsAlone(); }
 
 void Pipeline::plan(Watcher& watcher) {
   watcher_ = &watcher;
@@ -292,9 +321,24 @@ void Pipeline::plan(Watcher& watcher) {
       }
     }
   }
+  if (standsAlone()) return;
   wanted_ = parseLayers(options_.layers, in->lattice.layers());
   planRanges();
+  planNeeds();
   planSlabs();
+  checkDisk();
+}
+
+void Pipeline::planNeeds() {
+  Names needed;
+  for (auto stage = stages_.rbegin(); stage != stages_.rend(); ++stage) {
+    (*stage)->handed_on = needed;
+    if ((*stage)->sink()) {
+      const auto reads = (*stage)->sink()->reads();
+      needed.merge(reads ? Names(reads->begin(), reads->end()) : namesOf((*stage)->out()));
+    }
+    for (const Read& read : (*stage)->reads()) needed.insert(read.grid);
+  }
 }
 
 void Pipeline::planRanges() {
@@ -346,6 +390,27 @@ void Pipeline::planSlabs() {
   }
 }
 
+void Pipeline::checkDisk() const {
+  if (options_.explain) return;
+  for (const auto& stage : stages_) {
+    if (!stage->sink()) continue;
+    const OutputEstimate output = expectedOutput(*stage);
+    const double free = freeDiskBytes(output.path);
+    if (output.bytes > free) {
+      throw DataError(stage->name() + ": '" + output.path + "' needs about " +
+                      bytesText(output.bytes) + ", and its disk has " + bytesText(free) +
+                      " left; name another place, or fewer --layers");
+    }
+  }
+}
+
+OutputEstimate Pipeline::expectedOutput(const Stage& stage) const {
+  OutputEstimate output = stage.sink()->output();
+  const int all = stage.out().lattice.layers().size();
+  if (all > 0) output.bytes *= static_cast<double>(wanted_.size()) / all;
+  return output;
+}
+
 double Pipeline::memoryBudgetBytes() const {
   return options_.memory == "auto" ? 0.8 * availableMemoryBytes() : parseBytes(options_.memory);
 }
@@ -353,15 +418,27 @@ double Pipeline::memoryBudgetBytes() const {
 double Pipeline::expectedMemoryBytes(int slab_layers) const {
   constexpr double program_bytes = 40e6;
   double bytes = program_bytes;
+  const Stage* before = nullptr;
   for (const auto& stage : stages_) {
     bytes += stage->memoryBytes();
-    // A window holds the slabs its reach covers, and the filter's input is a copy of them.
     const int all = stage->out().lattice.layers().size();
-    const Reach reach = widest(stage->reads());
-    const int window_layers =
-        reach.whole || stage->isBarrier() ? all : slab_layers + reach.below + reach.above;
-    const double rows = std::min(all, window_layers) / static_cast<double>(leaf_layers) + 1;
-    bytes += bytesPerRow(stage->out()) * rows * (stage->filter() ? 2 : 1);
+    const auto rows = [&](int layers) {
+      return std::min(all, layers) / static_cast<double>(leaf_layers) + 1;
+    };
+    if (stage->source()) {
+      bytes += bytesPerRow(stage->out(), namesOf(stage->out())) * rows(slab_layers);
+    } else if (before) {
+      const Reach reach = widest(stage->reads());
+      const int window_layers =
+          reach.whole || stage->isBarrier() ? all : slab_layers + reach.below + reach.above;
+      // A window holds the slabs its reach covers, and a filter's input is a copy of what it reads.
+      bytes += bytesPerRow(before->out(), before->handed_on) * rows(window_layers);
+      Names copied;
+      for (const Read& read : stage->reads()) copied.insert(read.grid);
+      if (reach.below + reach.above > 0)
+        bytes += bytesPerRow(before->out(), copied) * rows(window_layers);
+    }
+    before = stage.get();
   }
   return bytes;
 }
@@ -397,6 +474,14 @@ std::string Pipeline::explanation() const {
   }
   text << "memory    about " << bytesText(expectedMemoryBytes(slab_layers_)) << " of "
        << bytesText(memoryBudgetBytes()) << "\n";
+  for (const auto& stage : stages_) {
+    if (!stage->sink()) continue;
+    const OutputEstimate output = expectedOutput(*stage);
+    if (output.bytes > 0) {
+      text << "disk      about " << bytesText(output.bytes) << " of "
+           << bytesText(freeDiskBytes(output.path)) << " for " << output.path << "\n";
+    }
+  }
   return text.str();
 }
 
@@ -406,14 +491,15 @@ void Pipeline::run() {
     threads.emplace(tbb::global_control::max_allowed_parallelism, options_.threads);
   }
   Stage& source = *stages_.front();
+  if (standsAlone()) return source.timed([&] { source.sink()->finish(); });
   for (int begin = source.cores.begin; begin < source.cores.end;) {
     // Cuts lie at multiples of the height whatever the first layer is, so that slabs of two runs
     // coincide.
     const int cut = begin - ((begin % slab_layers_) + slab_layers_) % slab_layers_ + slab_layers_;
     const ZRange core{begin, std::min(cut, source.cores.end)};
     Grids grids = source.timed([&] { return source.source()->run(core); });
-    source.complete(grids);
     if (options_.json || options_.verbose) source.countOutput(grids);
+    source.handOn(grids);
     push(1, {core, core, std::move(grids)});
     begin = core.end;
   }
@@ -454,7 +540,7 @@ void Pipeline::pushEmpty(std::size_t index, int end) {
     const int cut = begin - ((begin % slab_layers_) + slab_layers_) % slab_layers_ + slab_layers_;
     const ZRange core{begin, std::min(cut, end)};
     Grids nothing;
-    stages_[index - 1]->complete(nothing);
+    stages_[index - 1]->handOn(nothing);
     take(index, {core, core, std::move(nothing)});
   }
 }
@@ -464,11 +550,11 @@ void Pipeline::take(std::size_t index, Slab slab) {
   stage.next_layer = slab.core.end;
   for (Window::Task& task : stage.window->push(std::move(slab))) {
     Grids made = stage.timed([&] { return stage.filter()->run(task.input); });
+    if (options_.json || options_.verbose) stage.countOutput(made);
     for (const auto& [name, grid] : task.passing.grids) {
       if (stage.out().grids.contains(name)) made.try_emplace(name, grid);
     }
-    stage.complete(made);
-    if (options_.json || options_.verbose) stage.countOutput(made);
+    stage.handOn(made);
     const ZRange core = task.passing.core;
     task = {};
     push(index + 1, {core, core, std::move(made)});

@@ -68,13 +68,17 @@ class Pipeline {
   class Stage;
 
   void addStage(const Step& step);
+  [[nodiscard]] bool standsAlone() const;
   void planRanges();
+  void planNeeds();
   void planSlabs();
   void push(std::size_t index, Slab slab);
   void pushEmpty(std::size_t index, int end);
   void take(std::size_t index, Slab slab);
   [[nodiscard]] double expectedMemoryBytes(int slab_layers) const;
   [[nodiscard]] double memoryBudgetBytes() const;
+  [[nodiscard]] OutputEstimate expectedOutput(const Stage& stage) const;
+  void checkDisk() const;
 
   RunOptions options_;
   Options run_options_;

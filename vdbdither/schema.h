@@ -18,6 +18,8 @@ struct Schema {
   /// How many leaf nodes the surface crosses in the fullest row of leaves (eight layers); zero
   /// where unknown. Feeds the estimate of memory only.
   double leaves_per_row = 0;
+  /// How many it crosses in all; zero where unknown. Feeds the estimate of disk only.
+  double leaves = 0;
 };
 
 }  // namespace vdbdither

@@ -14,6 +14,7 @@
 #include "ops/kernels/leaf_bits.h"
 #include "ops/kernels/solid.h"
 #include "ops/kernels/voxel_diameter.h"
+#include "ops/kernels/wall_guard.h"
 
 namespace vdbdither {
 
@@ -26,11 +27,49 @@ namespace {
 
 using NormalAccessor = openvdb::tree::ValueAccessor<const Vec3STree, false>;
 
-/// Eq. (5).
-float displacement(const ShapeDither& dither, const Vec3s& normal, const Coord& ijk) {
+/// Eq. (5), or the facet's own. Zero, without a look at the mask, where no threshold could overturn
+/// a voxel at the distance `d_mm`.
+float displacement(const ShapeDither& dither, const Vec3s& normal, const Coord& ijk,
+                   float d_mm = 0) {
   const double half_diameter = halfVoxelDiameter(normal, dither.pitch_mm);
-  return static_cast<float>(dither.amplitude * half_diameter * (double{dither.mask(ijk)} - 0.5));
+  if (!dither.adapted)
+    return static_cast<float>(dither.amplitude * half_diameter * (double{dither.mask(ijk)} - 0.5));
+  if (std::abs(d_mm) > half_diameter) return 0;
+  const FacetDither facet = (*dither.adapted)(normal);
+  const double half_step = ((ijk.x() ^ ijk.y() ^ ijk.z()) & 1) != 0 ? 0.5 : -0.5;
+  const double random =
+      facet.amplitude != 0 ? double{facet.amplitude} * (double{dither.mask(ijk)} - 0.5) : 0;
+  return static_cast<float>(half_diameter * (double{facet.checker} * half_step + random));
 }
+
+/// The normals of the voxels of one leaf at a time: those given, or the gradient's.
+class VoxelNormals {
+ public:
+  VoxelNormals(const ShapeDither& dither, const FloatTree& surface, const Vec3STree* given,
+               ZRange valid)
+      : gradient_(surface, dither.pitch_mm, valid) {
+    if (given) given_.emplace(*given);
+  }
+
+  void visit(const FloatLeaf& leaf) {
+    leaf_ = &leaf;
+    visited_ = given_.has_value();
+  }
+
+  /// Of the active voxel at `offset`.
+  Vec3s operator()(unsigned offset) {
+    if (given_) return given_->getValue(leaf_->offsetToGlobalCoord(offset));
+    if (!visited_) gradient_.visit(*leaf_);
+    visited_ = true;
+    return gradient_.normal(offset);
+  }
+
+ private:
+  LeafNormals gradient_;
+  std::optional<NormalAccessor> given_;
+  const FloatLeaf* leaf_ = nullptr;
+  bool visited_ = false;
+};
 
 /// f on ∂V: active at its voxels. A leaf's transient data holds the bits of its greatest |f|.
 FloatTree surfaceDisplacements(const ShapeDither& dither, const FloatTree& surface,
@@ -88,9 +127,9 @@ class AtClosest {
   ClosestSurfaceVoxel closest_;
 };
 
-class AtFootOrVoxel {
+class AtFoot {
  public:
-  AtFootOrVoxel(const ShapeDither& dither, const Vec3STree& normals)
+  AtFoot(const ShapeDither& dither, const Vec3STree& normals)
       : dither_(dither), normals_(normals) {}
 
   /// F, and a little for the rounding of normals and f.
@@ -102,7 +141,6 @@ class AtFootOrVoxel {
   float operator()(unsigned offset, float d) {
     Coord ijk = leaf_->offsetToGlobalCoord(offset);
     const Vec3s normal = normals_.getValue(ijk);
-    if (dither_.at == DitherAt::voxel) return displacement(dither_, normal, ijk);
     for (int axis = 0; axis < 3; ++axis) {
       ijk[axis] +=
           static_cast<int>(std::floor(0.5 - double{d} * normal[axis] / dither_.pitch_mm[axis]));
@@ -113,6 +151,27 @@ class AtFootOrVoxel {
  private:
   const ShapeDither& dither_;
   NormalAccessor normals_;
+  const FloatLeaf* leaf_ = nullptr;
+};
+
+class AtVoxel {
+ public:
+  AtVoxel(const ShapeDither& dither, const VoxelNormals& normals)
+      : dither_(dither), normals_(normals) {}
+
+  float visit(const FloatLeaf& leaf) {
+    leaf_ = &leaf;
+    normals_.visit(leaf);
+    return static_cast<float>(dither_.largestDisplacementMm() * (1 + 1e-6));
+  }
+
+  float operator()(unsigned offset, float d) {
+    return displacement(dither_, normals_(offset), leaf_->offsetToGlobalCoord(offset), d);
+  }
+
+ private:
+  const ShapeDither& dither_;
+  VoxelNormals normals_;
   const FloatLeaf* leaf_ = nullptr;
 };
 
@@ -143,6 +202,7 @@ ShapeDither::Layers ShapeDither::reach(bool normals_given) const {
     layers.normals = static_cast<int>(std::ceil(largestDisplacementMm() / pitch_mm.z() + 0.5));
   // One more for the neighbours: those that make a surface voxel, and those of the gradient.
   if (at == DitherAt::closest || !normals_given) layers.surface = layers.normals + 1;
+  if (guarded) layers.surface = std::max(layers.surface, WallGuard::reachLayers(amplitude));
   return layers;
 }
 
@@ -154,21 +214,30 @@ ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
   const auto displaced = with_displaced ? makeDisplacedGrid(surface) : nullptr;
   if (displaced) displaced->setTree(std::make_shared<FloatTree>(surface.tree()));
 
+  const Vec3STree* given = normals ? &normals->tree() : nullptr;
   const auto decide = [&](const auto& make_reader) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size()), [&](const auto& range) {
       auto f = make_reader();
+      WallGuard guard(surface.tree(), pitch_mm, surface.background(), valid);
+      VoxelNormals guard_normals(*this, surface.tree(), given, valid);
       for (std::size_t n = range.begin(); n != range.end(); ++n) {
         const FloatLeaf& leaf = *leaves[n];
         const float* distances = leaf.buffer().data();
         const std::uint8_t within = rowWithin(leaf.origin().z(), core);
         FloatLeaf* moved = displaced ? displaced->tree().probeLeaf(leaf.origin()) : nullptr;
         const float f_bound = f.visit(leaf);
+        guard_normals.visit(leaf);
         const float bound = moved ? std::numeric_limits<float>::infinity() : f_bound;
 
         LeafBits inside = insideBits(leaf, within);
         const LeafBits undecided = bandBits(leaf, bound, within);
         forEachBit(undecided, [&](unsigned offset) {
-          const float d = distances[offset] + f(offset, distances[offset]);
+          const float plain = distances[offset];
+          float d = plain + f(offset, plain);
+          if (guarded && (d < 0) != (plain < 0) &&
+              !guard.allows(leaf.offsetToGlobalCoord(offset), guard_normals(offset), plain)) {
+            d = plain;
+          }
           const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
           inside[offset / 64] = d < 0 ? inside[offset / 64] | bit : inside[offset / 64] & ~bit;
           if (moved) moved->setValueOnly(offset, d);
@@ -179,7 +248,6 @@ ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
   };
 
   const int halo = reach(true).normals;
-  const Vec3STree* given = normals ? &normals->tree() : nullptr;
   if (amplitude == 0) {
     decide([] { return Nowhere(); });
   } else if (at == DitherAt::closest) {
@@ -187,10 +255,12 @@ ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
     const FloatTree displacements =
         surfaceDisplacements(*this, surface.tree(), given, grownWithin(core, halo, valid), valid);
     decide([&] { return AtClosest(displacements, disk); });
-  } else {
+  } else if (at == DitherAt::foot) {
     const auto made =
         given ? nullptr : outwardNormals(surface, pitch_mm, grownWithin(core, halo, valid), valid);
-    decide([&] { return AtFootOrVoxel(*this, given ? *given : made->tree()); });
+    decide([&] { return AtFoot(*this, given ? *given : made->tree()); });
+  } else {
+    decide([&] { return AtVoxel(*this, VoxelNormals(*this, surface.tree(), given, valid)); });
   }
 
   return {makeSolidGrid(surface.transform(), printed, insideTiles(surface.tree(), core)),

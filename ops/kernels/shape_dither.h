@@ -1,7 +1,10 @@
 #pragma once
 
+#include <memory>
+
 #include <openvdb/openvdb.h>
 
+#include "ops/kernels/adapted_amplitude.h"
 #include "ops/kernels/threshold_mask.h"
 #include "vdbdither/lattice.h"
 
@@ -24,6 +27,10 @@ struct ShapeDither {
   double amplitude = 4;  ///< the constant of eq. (5)
   DitherAt at = DitherAt::closest;
   ThresholdMask mask = ThresholdMask::constant(0.5F);
+  /// In place of `amplitude`, which then is 2, the constant that no facet exceeds; null: the same
+  /// for all.
+  std::shared_ptr<const AdaptedAmplitude> adapted = nullptr;
+  bool guarded = false;  ///< spares thin walls and gaps: see WallGuard
 
   /// F: no |f| is greater. Half an amplitude of the largest k_D, which is half a voxel's diagonal.
   [[nodiscard]] double largestDisplacementMm() const { return amplitude * pitch_mm.length() / 4; }
@@ -53,7 +60,8 @@ struct ShapeDither {
   ///
   /// f is computed in double precision from single-precision normals and thresholds and rounded to
   /// single once; then d + f < 0 decides, exactly. Inactive voxels and tiles are decided by the
-  /// sign of d. A voxel whose v̄ is not found, or where there is no normal, has f = 0.
+  /// sign of d. A voxel whose v̄ is not found, where there is no normal, or that f would overturn
+  /// against the guard has f = 0.
   ///
   /// \param surface  d in mm; its band must hold F
   /// \param normals  `N`, or null: the gradient's

@@ -109,6 +109,26 @@ void dither(benchmark::State& state, DitherAt at, bool given_normals, bool with_
   reportPerVoxel(state, slab, dither.largestDisplacementMm());
 }
 
+/// The default.
+void best(benchmark::State& state, bool given_normals, bool guarded) {
+  const SphereSlab& slab = sphereSlab(static_cast<int>(state.range(0)));
+  const ShapeDither dither{pitch_mm,
+                           2,
+                           DitherAt::voxel,
+                           randomMask(),
+                           std::make_shared<AdaptedAmplitude>(pitch_mm, 0.05),
+                           guarded};
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(dither.run(*slab.surface, given_normals ? slab.normals.get() : nullptr,
+                                        slab.core, slab.valid, false));
+  }
+  reportPerVoxel(state, slab, pitch_mm.length());
+}
+
+void adaptedAmplitude(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(AdaptedAmplitude(pitch_mm, 0.05));
+}
+
 void normals(benchmark::State& state) {
   const SphereSlab& slab = sphereSlab(static_cast<int>(state.range(0)));
   for (auto _ : state)
@@ -141,6 +161,10 @@ BENCHMARK_CAPTURE(dither, closest_own_normals, DitherAt::closest, false, false) 
 BENCHMARK_CAPTURE(dither, closest_displaced, DitherAt::closest, true, true) AT_HEIGHTS;
 BENCHMARK_CAPTURE(dither, foot, DitherAt::foot, true, false) AT_HEIGHTS;
 BENCHMARK_CAPTURE(dither, voxel, DitherAt::voxel, true, false) AT_HEIGHTS;
+BENCHMARK_CAPTURE(best, best, true, true) AT_HEIGHTS;
+BENCHMARK_CAPTURE(best, best_own_normals, false, true) AT_HEIGHTS;
+BENCHMARK_CAPTURE(best, best_unguarded, true, false) AT_HEIGHTS;
+BENCHMARK(adaptedAmplitude)->Unit(benchmark::kMillisecond);
 BENCHMARK(normals) AT_HEIGHTS;
 BENCHMARK(surfaceVoxels) AT_HEIGHTS;
 BENCHMARK(interlaced) AT_HEIGHTS;

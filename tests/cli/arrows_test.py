@@ -9,7 +9,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 def included(path):
     """The files of the project that a source names in its includes."""
-    return re.findall(r'^\s*#\s*include\s*["<]((?:vdbdither|io|ops|tests)/[^">]+)', path.read_text(), re.MULTILINE)
+    return re.findall(r'^\s*#\s*include\s*["<]((?:vdbdither|io|ops|commands|tests)/[^">]+)', path.read_text(), re.MULTILINE)
 
 
 def sources(folder):
@@ -38,15 +38,18 @@ class Arrows(unittest.TestCase):
     def test_operators_include_no_operator(self):
         self.assert_includes("ops", "ops/kernels/", "io/", "vdbdither/")
 
+    def test_commands_know_no_operator(self):
+        self.assert_includes("commands", "commands/", "ops/kernels/", "io/", "vdbdither/")
+
     def test_operators_have_no_headers(self):
         self.assertEqual([path.name for path in sources("ops") if path.suffix == ".h"], [])
 
     def test_kernels_know_no_pipeline(self):
-        vocabulary = ("errors", "lattice", "mesh", "openvdb")
+        vocabulary = ("errors", "grid", "lattice", "mesh", "openvdb", "visit_grid")
         self.assert_includes("ops/kernels", "ops/kernels/", *(f"vdbdither/{name}.h" for name in vocabulary))
 
     def test_nothing_but_tests_includes_tests(self):
-        for folder in ("vdbdither", "io", "ops", "ops/kernels"):
+        for folder in ("vdbdither", "io", "ops", "ops/kernels", "commands"):
             for path in sources(folder):
                 self.assertFalse([name for name in included(path) if name.startswith("tests/")], path)
 

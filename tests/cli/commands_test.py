@@ -38,7 +38,7 @@ class Words(ProgramTest):
         overview = self.succeed("--help").decode()
         self.assertEqual(overview, self.succeed("help").decode())
         for name in operators():
-            self.assertRegex(overview, rf"(?m)^  {name} +\S")
+            self.assertRegex(overview, rf"(?m)^(Sources|Filters|Sinks|Commands|  ) .*\b{name}\b")
 
     def test_help_of_every_operator_shows_usage_options_and_an_example(self):
         for name in operators():

@@ -1,9 +1,11 @@
-"""The example in the help of every operator runs."""
+"""Every example runs: those in the help, and the commands that README.md and docs show."""
 
+import re
+import shutil
 import unittest
 
 import meshes
-from program import PROGRAM, ProgramTest
+from program import PROGRAM, ROOT, ProgramTest
 
 
 class Examples(ProgramTest):
@@ -18,9 +20,37 @@ class Examples(ProgramTest):
                 meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
                 help_text = self.succeed("help", link.name).decode()
                 example = help_text.split("Example:\n")[1].strip()
-                self.assertTrue(example.startswith("vdbdither "), example)
-                self.shell(example)
+                for line in example.splitlines():
+                    self.assertTrue(line.strip().startswith("vdbdither "), example)
+                    self.shell(line)
                 self.assertGreater(len(self.listing()), 1, "it makes something")
+
+
+class Documents(ProgramTest):
+    """The commands that README.md and docs show."""
+
+    def blocks(self, path):
+        """Indented blocks of commands of the program, and of it alone."""
+        for block in re.findall(r"(?m)(?:^    .+\n)+", path.read_text()):
+            lines = [line.split("  #")[0].strip() for line in re.sub(r"\\\n\s*", "", block).splitlines()]
+            if all(line.split()[0] in ("vdbdither", "mesh2sdf") for line in lines):
+                yield lines
+
+    def test_every_command_in_the_documents_runs(self):
+        ran = 0
+        for path in sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md")]):
+            for lines in self.blocks(path):
+                with self.subTest(document=path.name, lines=lines):
+                    self.doCleanups()
+                    super().setUp()
+                    meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
+                    for line in lines:
+                        # Ways to the same end are shown one below the other.
+                        if "slice-export out" in line:
+                            shutil.rmtree(self.folder / "out", ignore_errors=True)
+                        self.shell(line)
+                    ran += 1
+        self.assertGreater(ran, 15)
 
 
 if __name__ == "__main__":

@@ -56,6 +56,14 @@ class Install(ProgramTest):
         self.succeed("-i", "b.vdb", "again", program=links / "slice-export")
         self.assertEqual(stack.sums(self.folder / "again"), stack.sums(self.folder / "out"))
 
+    def test_manual_pages_and_completion_lie_where_shells_look(self):
+        share = self.prefix / "share"
+        pages = {page.name for page in (share / "man/man1").iterdir()}
+        self.assertLessEqual({"vdbdither.1", "vdbdither-slice-export.1", "vdbdither-printers.1"}, pages)
+        for script in ("bash-completion/completions/vdbdither", "zsh/site-functions/_vdbdither",
+                       "fish/vendor_completions.d/vdbdither.fish"):
+            self.assertIn("slice-export", (share / script).read_text())
+
     def test_a_program_that_finds_the_package_links_every_operator(self):
         source = self.folder / "consumer"
         source.mkdir()

@@ -152,7 +152,7 @@ TEST(MeshReader, RefusesWhatIsNoRegularFile) {
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   const std::string name = folder.path().string();
   EXPECT_EQ(refusalOfPath(folder.path()),
-            "'" + name + "': a directory; name an STL, OBJ or PLY file in it");
+            "'" + name + "': a folder; name the meshes in it, as in " + name + "/*.stl");
   EXPECT_EQ(refusalOfPath(pipe), "'" + name +
                                      "/pipe': a pipe or device; mesh input needs a regular file, "
                                      "save it first");

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include <gtest/gtest.h>
 
@@ -20,18 +21,24 @@ namespace {
 using test::firstBreach;
 namespace fs = std::filesystem;
 
-class Silent : public Watcher {
+/// Keeps what operators are there to tell.
+class Listener : public Watcher {
  public:
   void warn(const std::string&, const std::string&) override {}
   void progress(const std::string&, int, int, double) override {}
+  void print(const std::string& text) override { printed += text; }
+
+  std::string printed;
 };
 
-void runChain(std::vector<Step> steps, const std::vector<std::string>& more = {}) {
+/// Returns what the chain told.
+std::string runChain(std::vector<Step> steps, const std::vector<std::string>& more = {}) {
   for (const std::string& argument : more) steps.back().arguments.push_back(argument);
-  Silent silent;
+  Listener listener;
   Pipeline pipeline(steps);
-  pipeline.plan(silent);
+  pipeline.plan(listener);
   pipeline.run();
+  return listener.printed;
 }
 
 /// Every registered operator by its example, in a folder with a part.
@@ -57,16 +64,20 @@ class Contract : public testing::TestWithParam<const OperatorInfo*> {
     return folder;
   }
 
-  /// The chain of the example that has the operator. Those before it, which `&&` parts, are run.
-  [[nodiscard]] static std::vector<Step> example() {
-    std::vector<std::string> words = splitWords(std::string(GetParam()->example));
-    for (;;) {
-      const auto end = std::find(words.begin(), words.end(), "&&");
-      if (end == words.end()) return parseChain(words);
-      runChain(parseChain({words.begin(), end}));
-      EXPECT_EQ(*(end + 1), "vdbdither");
-      words.erase(words.begin(), end + 2);
-    }
+  /// The chains of the example; the last one shows the operator.
+  [[nodiscard]] static std::vector<std::vector<Step>> chains() {
+    std::vector<std::vector<Step>> chains;
+    std::istringstream text{std::string(GetParam()->example)};
+    for (std::string line; std::getline(text, line);)
+      chains.push_back(parseChain(splitWords(line)));
+    return chains;
+  }
+
+  /// Returns what it told.
+  static std::string runExample(const std::vector<std::string>& more = {}) {
+    std::string printed;
+    for (const std::vector<Step>& chain : chains()) printed += runChain(chain, more);
+    return printed;
   }
 
   test::ScratchFolder scratch_;
@@ -74,12 +85,12 @@ class Contract : public testing::TestWithParam<const OperatorInfo*> {
 };
 
 TEST_P(Contract, ItsExampleNamesItAndRuns) {
-  const fs::path folder = enter("example");
-  const std::vector<Step> steps = example();
+  const std::vector<Step> steps = chains().back();
   EXPECT_TRUE(GetParam()->transport ||
               std::any_of(steps.begin(), steps.end(),
                           [](const Step& step) { return step.verb == GetParam()->name; }));
-  runChain(steps);
+  const fs::path folder = enter("example");
+  runExample();
   EXPECT_GT(test::filesUnder(folder).size(), 1U);
 }
 
@@ -100,7 +111,7 @@ TEST_P(Contract, ItsWordsAreOfOneStyle) {
 
 TEST_P(Contract, SlabHeightAndThreadsChangeNoByte) {
   const fs::path reference = enter("reference");
-  runChain(example());
+  const std::string printed = runExample();
   const auto expected = test::filesUnder(reference);
   for (const std::vector<std::string>& more :
        std::vector<std::vector<std::string>>{{"--slab", "8"},
@@ -108,18 +119,21 @@ TEST_P(Contract, SlabHeightAndThreadsChangeNoByte) {
                                              {"--slab", "all"},
                                              {"--threads", "1"}}) {
     const fs::path folder = enter(more[0] + more[1]);
-    runChain(example(), more);
+    EXPECT_EQ(runExample(more), printed) << more[0] << " " << more[1];
     EXPECT_TRUE(test::filesUnder(folder) == expected) << more[0] << " " << more[1];
   }
 }
 
 TEST_P(Contract, ItKeepsWhatAFilterPromises) {
-  const std::vector<Step> steps = example();
+  std::vector<std::vector<Step>> before = chains();
+  const std::vector<Step> steps = before.back();
+  before.pop_back();
   const auto step = std::find_if(steps.begin(), steps.end(),
                                  [](const Step& s) { return s.verb == GetParam()->name; });
   const std::unique_ptr<Operator> made = GetParam()->make();
   auto* filter = dynamic_cast<Filter*>(made.get());
   if (!filter) GTEST_SKIP() << "no filter";
+  for (const std::vector<Step>& chain : before) runChain(chain);
   std::vector<Step> upstream(steps.begin(), step);
   upstream.push_back({"write", {"upstream.vdb"}});
   runChain(upstream);

@@ -37,7 +37,7 @@ TEST(Dither, MakesTheSameOfSlabsOfAnyHeightWhateverLiesBeyondItsReach) {
   with_normals.grids.merge(test::runWhole(*test::filterCalled("normals"), plain));
   for (const Schema& schema : {plain, with_normals}) {
     for (const std::string at : {"closest", "foot", "voxel"}) {
-      for (const std::string amplitude : {"4", "8"}) {
+      for (const std::string amplitude : {"4", "8", "adapted"}) {
         const auto dither =
             test::filterCalled("dither", {"--mask", "white", "--at", at, "--amplitude", amplitude});
         const auto solid =
@@ -115,7 +115,7 @@ TEST(Dither, WhiteNoiseDependsOnTheSeedAlone) {
         mimaki.box);
   };
   EXPECT_EQ(solid("4"), solid("4"));
-  EXPECT_GT(test::differences(solid("4"), solid("5")), 100);
+  EXPECT_GT(test::differences(solid("4"), solid("5")), 10);
 }
 
 /// Writes a grid `mask` to a file that goes away with the test.
@@ -158,7 +158,7 @@ TEST_F(MaskFile, IsReadAtTheAbsoluteIndexModuloItsSize) {
 TEST_F(MaskFile, OfOneHalfEverywherePrintsPlainVoxels) {
   const Schema schema = ballOn(mimaki);
   const auto solid = [&](const std::string& mask) {
-    const auto dither = test::filterCalled("dither", {"--mask", mask});
+    const auto dither = test::filterCalled("dither", {"--preset", "paper", "--mask", mask});
     return test::dense(
         *openvdb::gridConstPtrCast<BoolGrid>(test::runWhole(*dither, schema).at("solid")),
         mimaki.box);
@@ -200,11 +200,16 @@ TEST(Dither, RefusesASurfaceThatDoesNotReachFarEnough) {
   const Schema thin = test::schemaOf(mimaki, {{"surface", FloatGrid::create(0.09F)}});
   EXPECT_THAT(
       [&] {
-        test::filterCalled("dither", {"--mask", "white"})->plan(thin);
+        test::filterCalled("dither", {"--mask", "white", "--preset", "paper"})->plan(thin);
       },
       ThrowsMessage<DataError>(
           "grid 'surface' holds distances up to 0.09 mm, and --amplitude 4 on this "
           "lattice needs 0.0965 mm"));
+  EXPECT_THAT(
+      [&] {
+        test::filterCalled("dither", {"--mask", "white"})->plan(thin);
+      },
+      ThrowsMessage<DataError>(HasSubstr("--amplitude adapted on this lattice needs 0.0965 mm")));
   EXPECT_NO_THROW(test::filterCalled("dither", {"--mask", "none"})->plan(thin));
 }
 
@@ -224,9 +229,40 @@ TEST(Dither, RefusesToRunWithoutASurface) {
 }
 
 TEST(Dither, RefusesAmplitudesBeyondEightAndPlacesItDoesNotKnow) {
-  EXPECT_THROW(test::filterCalled("dither", {"--amplitude", "8.1"}), UsageError);
-  EXPECT_THROW(test::filterCalled("dither", {"--amplitude", "-1"}), UsageError);
-  EXPECT_THROW(test::filterCalled("dither", {"--at", "surface"}), UsageError);
+  const auto planning = [](const std::string& option, const std::string& value) {
+    return [option, value] {
+      test::filterCalled("dither", {"--mask", "white", option, value})->plan(ballOn(mimaki));
+    };
+  };
+  for (const std::string bad : {"8.1", "-1", "nan", "4x", "much"}) {
+    EXPECT_THAT(planning("--amplitude", bad),
+                ThrowsMessage<UsageError>("--amplitude: '" + bad +
+                                          "' is neither 'adapted' nor a number from 0 to 8"));
+  }
+  EXPECT_THROW(planning("--at", "surface")(), UsageError);
+  EXPECT_THROW(planning("--guard", "all")(), UsageError);
+  EXPECT_THAT(planning("--spread", "2mm"),
+              ThrowsMessage<UsageError>("--spread: 2 mm is not between 0.01 mm and 1 mm"));
+  EXPECT_THROW(test::filterCalled("dither", {"--preset", "worst"}), UsageError);
+}
+
+test::Voxels solidBy(const std::vector<std::string>& options) {
+  const Schema schema = ballOn(mimaki);
+  std::vector<std::string> words{"--mask", "white"};
+  words.insert(words.end(), options.begin(), options.end());
+  return test::dense(*openvdb::gridConstPtrCast<BoolGrid>(
+                         test::runWhole(*test::filterCalled("dither", words), schema).at("solid")),
+                     mimaki.box);
+}
+
+TEST(Dither, PresetsAreWhatTheirOptionsSay) {
+  EXPECT_EQ(solidBy({}), solidBy({"--preset", "best"}));
+  EXPECT_EQ(solidBy({}), solidBy({"--preset", "paper", "--amplitude", "adapted", "--at", "voxel",
+                                  "--guard", "walls"}));
+  EXPECT_EQ(solidBy({"--preset", "paper"}),
+            solidBy({"--amplitude", "4", "--at", "closest", "--guard", "none"}));
+  EXPECT_GT(test::differences(solidBy({}), solidBy({"--preset", "paper"})), 1000);
+  EXPECT_GT(test::differences(solidBy({}), solidBy({"--spread", "25um"})), 10);
 }
 
 }  // namespace

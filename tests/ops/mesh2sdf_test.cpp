@@ -154,7 +154,8 @@ TEST_F(Mesh2Sdf, RefusesTrianglesThatEncloseNothing) {
 }
 
 TEST_F(Mesh2Sdf, RefusesWhatItCannotMean) {
-  EXPECT_EQ(refusal<UsageError>({}), "give either --printer NAME or --pitch DX,DY,DZ");
+  EXPECT_EQ(refusal<UsageError>({}),
+            "give either --printer NAME (vdbdither printers lists them) or --pitch DX,DY,DZ");
   EXPECT_EQ(refusal<UsageError>({"--pitch", "1,2"}),
             "--pitch: '1,2' is not three lengths such as 42um,84um,22um");
   EXPECT_EQ(refusal<UsageError>({"--pitch", "1,2,0"}),

@@ -1,0 +1,253 @@
+#include "commands/manual.h"
+
+#include <algorithm>
+#include <array>
+
+#include "vdbdither/registry.h"
+#include "vdbdither/run_options.h"
+#include "vdbdither/version.h"
+
+namespace vdbdither {
+
+namespace {
+
+using Files = std::vector<std::pair<std::string, std::string>>;
+
+constexpr std::size_t line_width = 79;
+constexpr std::string_view chain_example =
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign ! slice-export out";
+
+/// `--name VALUE`, `-o, --output FILE`, or the name of a positional.
+std::string spelled(const Option& option) {
+  if (option.kind == Option::Kind::positional) return option.name;
+  std::string text;
+  if (option.letter) text.append("-").append(1, option.letter).append(", ");
+  text.append("--").append(option.name);
+  if (option.kind == Option::Kind::value) text.append(" ").append(option.value);
+  return text;
+}
+
+std::string usage(const Page& page) {
+  std::string text = "vdbdither " + page.name;
+  for (const Option& option : page.options.all()) {
+    if (option.kind != Option::Kind::positional) continue;
+    const std::string word = option.name + (option.repeated ? "..." : "");
+    text += option.required ? " " + word : " [" + word + "]";
+  }
+  return text + " [options]";
+}
+
+std::string whatItIs(const Page& page) {
+  if (page.kind == "source") return "A source: it makes layers and begins a chain.";
+  if (page.kind == "filter") return "A filter: it changes the layers that pass through it.";
+  if (page.kind == "sink")
+    return "A sink: it takes the layers that come to it. In mid-chain they pass on.";
+  return "A command: it stands alone, in no chain.";
+}
+
+/// `words` in lines of at most `line_width`, all indented alike.
+std::string wrapped(const std::vector<std::string>& words, std::size_t indent) {
+  std::string text;
+  std::size_t column = indent;
+  for (const std::string& word : words) {
+    if (column + 1 + word.size() > line_width) {
+      text.append(1, '\n').append(indent, ' ');
+      column = indent;
+    }
+    if (column > indent) {
+      text += ' ';
+      ++column;
+    }
+    text += word;
+    column += word.size();
+  }
+  return text;
+}
+
+std::string replaced(std::string_view text, std::string_view from, std::string_view to) {
+  std::string result;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t at = std::min(text.find(from, begin), text.size());
+    result.append(text.substr(begin, at - begin));
+    if (at == text.size()) break;
+    result.append(to);
+    begin = at + from.size();
+  }
+  return result;
+}
+
+/// Fit for a cell of a table.
+std::string cell(const std::string& text) { return replaced(text, "|", "\\|"); }
+
+std::string markdownOptions(const Options& options) {
+  std::string text = "| option | default | meaning |\n| --- | --- | --- |\n";
+  for (const Option& option : options.all()) {
+    text += "| `" + cell(spelled(option)) + "` | " +
+            (option.fallback.empty() ? "" : "`" + cell(option.fallback) + "`") + " | " +
+            cell(option.help) + " |\n";
+  }
+  return text;
+}
+
+std::string markdownPage(const Page& page) {
+  std::string text = "# " + page.name + "\n\n" + page.summary + ".\n\n" + whatItIs(page) +
+                     "\n\n```\n" + usage(page) + "\n```\n\n";
+  if (!page.options.all().empty()) text += markdownOptions(page.options) + "\n";
+  if (page.kind != "command") text += "Besides the [options of every operator](README.md).\n\n";
+  return text + "Example:\n\n    vdbdither " + replaced(page.example, "\n", "\n    vdbdither ") +
+         "\n";
+}
+
+std::string markdownIndex() {
+  std::string text = "# Operators and commands\n\n| | | |\n| --- | --- | --- |\n";
+  for (const Page& page : pages()) {
+    text += "| [" + page.name + "](" + page.name + ".md) | " + page.kind + " | " + page.summary +
+            " |\n";
+  }
+  return text +
+         "\n## Options of every operator\n\nThey concern the run as a whole, wherever in a "
+         "chain they stand.\n\n" +
+         markdownOptions(commonPage().options);
+}
+
+/// Fit for running text in troff.
+std::string troff(const std::string& text) {
+  std::string safe = replaced(replaced(text, "\\", "\\e"), "-", "\\-");
+  const bool control = safe.starts_with('.') || safe.starts_with('\'');
+  return std::string(control ? "\\&" : "").append(safe);
+}
+
+std::string troffOptions(const Options& options) {
+  std::string text;
+  for (const Option& option : options.all()) {
+    text.append(".TP\n.B ").append(troff(spelled(option))).append("\n");
+    text.append(troff(option.help)).append(".");
+    if (!option.fallback.empty()) text += "\nDefault: " + troff(option.fallback) + ".";
+    text += "\n";
+  }
+  return text;
+}
+
+std::string troffHead(const std::string& name, const std::string& summary) {
+  return ".TH \"" + replaced(name, "-", "\\-") + "\" 1 \"\" \"vdbdither " + version +
+         "\" \"vdbdither\"\n.SH NAME\n" + troff(name) + " \\- " + troff(summary) + "\n";
+}
+
+std::string manualPage(const Page& page) {
+  std::string text = troffHead("vdbdither-" + page.name, page.summary) + ".SH SYNOPSIS\n.B " +
+                     troff(usage(page)) + "\n.SH DESCRIPTION\n" + troff(whatItIs(page)) + "\n";
+  if (!page.options.all().empty()) text += ".SH OPTIONS\n" + troffOptions(page.options);
+  if (page.kind != "command") text += ".PP\nOptions of every operator: see\n.BR vdbdither (1).\n";
+  return text + ".SH EXAMPLE\n.nf\nvdbdither " +
+         troff(replaced(page.example, "\n", "\nvdbdither ")) +
+         "\n.fi\n.SH SEE ALSO\n.BR vdbdither (1)\n";
+}
+
+std::string mainManualPage() {
+  std::string text =
+      troffHead("vdbdither", "shape dithering for voxel-controlled 3D printing") +
+      ".SH SYNOPSIS\n.B vdbdither\nOPERATOR [arguments] [! OPERATOR [arguments] "
+      "...]\n.br\n.B vdbdither run\n\"OPERATOR ... | OPERATOR ...\"\n.br\n.B "
+      "vdbdither help\n[OPERATOR]\n.SH DESCRIPTION\nOperators work on sparse OpenVDB "
+      "grids, layer by layer, and chain. They read and write .vdb: files with names, "
+      "or pipes between processes; an exclamation mark joins operators in one "
+      "process.\n.SH OPERATORS AND COMMANDS\n";
+  for (const Page& page : pages())
+    text += ".TP\n.BR " + troff("vdbdither-" + page.name) + " (1)\n" + troff(page.summary) + ".\n";
+  return text + ".SH OPTIONS OF EVERY OPERATOR\n" + troffOptions(commonPage().options) +
+         ".SH EXIT STATUS\n0 done, 1 bad data or a failed run, 2 wrong usage.\n.SH "
+         "EXAMPLE\n.nf\nvdbdither " +
+         troff(std::string(chain_example)) + "\n.fi\n";
+}
+
+}  // namespace
+
+Page pageOf(const OperatorInfo& info) {
+  const std::shared_ptr<Operator> made = info.make();
+  Page page{std::string(info.name),    "sink", std::string(info.summary),
+            std::string(info.example), {},     made};
+  if (dynamic_cast<Source*>(made.get())) page.kind = "source";
+  if (dynamic_cast<Filter*>(made.get())) page.kind = "filter";
+  made->declare(page.options);
+  return page;
+}
+
+Page pageOf(const CommandInfo& info) {
+  const std::shared_ptr<Command> made = info.make();
+  Page page{std::string(info.name),    "command", std::string(info.summary),
+            std::string(info.example), {},        made};
+  made->declare(page.options);
+  return page;
+}
+
+Page commonPage() {
+  const auto made = std::make_shared<RunOptions>();
+  Page page{"", "", "", "", {}, made};
+  made->declare(page.options);
+  return page;
+}
+
+std::vector<Page> pages() {
+  std::vector<Page> all;
+  for (const OperatorInfo* info : registeredOperators()) all.push_back(pageOf(*info));
+  for (const CommandInfo* info : commands()) {
+    if (!info->hidden) all.push_back(pageOf(*info));
+  }
+  std::sort(all.begin(), all.end(), [](const Page& a, const Page& b) { return a.name < b.name; });
+  return all;
+}
+
+std::string helpText(const Page& page) {
+  const Page common = page.kind == "command" ? Page{} : commonPage();
+  return page.options.help(page.name, page.summary, page.example, common.options);
+}
+
+std::string overview() {
+  std::string text =
+      "vdbdither: shape dithering for voxel-controlled 3D printing\n\n"
+      "Usage: vdbdither OPERATOR [arguments] [! OPERATOR [arguments] ...]\n"
+      "       vdbdither run \"OPERATOR ... | OPERATOR ...\"\n"
+      "       vdbdither help OPERATOR, or all\n\n";
+  constexpr std::array<std::pair<const char*, const char*>, 4> groups{{{"source", "Sources   "},
+                                                                       {"filter", "Filters   "},
+                                                                       {"sink", "Sinks     "},
+                                                                       {"command", "Commands  "}}};
+  for (const auto& [kind, title] : groups) {
+    std::vector<std::string> names;
+    for (const Page& page : pages()) {
+      if (page.kind == kind) names.push_back(page.name);
+    }
+    text += title + wrapped(names, std::string_view(title).size()) + "\n";
+  }
+  return text +
+         "\nOperators read and write .vdb: -i and -o name files, pipes carry layers, ! joins\n"
+         "operators in one process. A chain begins with a source, or with read if it has\n"
+         "none, and ends with a sink, or with write.\n\n"
+         "Example: vdbdither mesh2sdf part.stl --printer mimaki-3duj-553 ! dither !\n"
+         "           material-assign ! slice-export out\n";
+}
+
+std::string listing() {
+  std::string text;
+  for (const Page& page : pages()) {
+    text += page.name +
+            std::string(std::max<std::size_t>(18, page.name.size() + 1) - page.name.size(), ' ') +
+            page.summary + "\n";
+  }
+  return text;
+}
+
+Files markdownFiles() {
+  Files files{{"README.md", markdownIndex()}};
+  for (const Page& page : pages()) files.emplace_back(page.name + ".md", markdownPage(page));
+  return files;
+}
+
+Files manualFiles() {
+  Files files{{"vdbdither.1", mainManualPage()}};
+  for (const Page& page : pages())
+    files.emplace_back("vdbdither-" + page.name + ".1", manualPage(page));
+  return files;
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,105 @@
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
+#include "commands/command.h"
+#include "io/printer_profile.h"
+#include "io/standard_streams.h"
+#include "vdbdither/errors.h"
+
+namespace vdbdither {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+std::string lengthsText(const openvdb::Vec3d& mm) {
+  // To the nanometre.
+  const auto text = [](double length) { return shortestText(std::round(length * 1e6) / 1e6); };
+  return text(mm[0]) + " x " + text(mm[1]) + " x " + text(mm[2]) + " mm";
+}
+
+/// The profiles there are, one of them, or whether a file is one.
+class Printers : public Command {
+ public:
+  void declare(Options& options) override {
+    options.positional("action", action_, "list (as without), show or check", false);
+    options.positional("printer", printer_, "For show and check: a name, or a profile file (.json)",
+                       false);
+    options.flag("json", as_json_, "Say it as JSON");
+  }
+
+  void run() override {
+    if (action_.empty() || action_ == "list") {
+      if (!printer_.empty()) throw UsageError("unexpected argument '" + printer_ + "'; see --help");
+      return print(list());
+    }
+    if (action_ != "show" && action_ != "check")
+      throw UsageError("action: '" + action_ + "' is none of list, show, check");
+    if (printer_.empty()) throw UsageError("printer is missing; see --help");
+    print(action_ == "show" ? show(readPrinterProfile(printer_)) : check());
+  }
+
+ private:
+  static void print(const std::string& text) { printData(text.c_str()); }
+
+  [[nodiscard]] std::string list() const {
+    ordered_json json = ordered_json::array();
+    std::ostringstream text;
+    for (const std::string& name : installedPrinters()) {
+      const PrinterProfile profile = readPrinterProfile(name);
+      json.push_back(ordered_json::parse(toJson(profile)));
+      text << name << std::string(std::max<std::size_t>(24, name.size() + 1) - name.size(), ' ')
+           << lengthsText(profile.pitch_mm) << "  " << profile.title << "\n";
+    }
+    return as_json_ ? json.dump() + "\n" : text.str();
+  }
+
+  [[nodiscard]] std::string show(const PrinterProfile& profile) const {
+    if (as_json_) return toJson(profile) + "\n";
+    std::ostringstream text;
+    text << "name      " << profile.name << "\ntitle     " << profile.title << "\npitch     "
+         << lengthsText(profile.pitch_mm) << "\n";
+    if (profile.build_mm != openvdb::Vec3d(0.0))
+      text << "build     " << lengthsText(profile.build_mm) << "\n";
+    const char* head = "materials ";
+    for (const Material& material : profile.materials) {
+      text << head << material.name;
+      for (std::size_t channel = 0; channel < 4; ++channel)
+        text << (channel == 0 ? " " : ",") << int{material.rgba[channel]};
+      text << "\n";
+      head = "          ";
+    }
+    if (!profile.source.empty()) text << "source    " << profile.source << "\n";
+    return text.str();
+  }
+
+  [[nodiscard]] std::string check() const {
+    const std::vector<std::string> problems = printerProfileProblems(printer_);
+    if (as_json_) {
+      print(ordered_json{{"profile", printer_}, {"problems", problems}}.dump() + "\n");
+    } else {
+      for (const std::string& problem : problems) print(problem + "\n");
+    }
+    if (!problems.empty()) {
+      throw DataError("'" + printer_ + "' has " + std::to_string(problems.size()) +
+                      (problems.size() == 1 ? " problem" : " problems"));
+    }
+    return as_json_ ? "" : "'" + printer_ + "' is a proper profile\n";
+  }
+
+  std::string action_;
+  std::string printer_;
+  bool as_json_ = false;
+};
+
+}  // namespace
+
+extern const CommandInfo printers;
+const CommandInfo printers{
+    "printers", "Lists, shows and checks printer profiles", "printers show mimaki-3duj-553",
+    []() -> std::unique_ptr<Command> { return std::make_unique<Printers>(); }};
+
+}  // namespace vdbdither

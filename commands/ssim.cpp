@@ -1,0 +1,198 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "commands/command.h"
+#include "io/picture.h"
+#include "io/png_runs.h"
+#include "io/staged_output.h"
+#include "io/standard_streams.h"
+#include "ops/kernels/picture_similarity.h"
+#include "vdbdither/errors.h"
+
+namespace vdbdither {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+/// The channels over a grey background, sRGB-coded, 0 to 1.
+ColourPlanes channelsOf(const Picture& picture, double background) {
+  ColourPlanes planes;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    planes[channel] = Plane(static_cast<int>(picture.width), static_cast<int>(picture.height));
+    for (std::size_t i = 0; i < picture.pixels.size(); ++i) {
+      const double value = (picture.pixels[i] >> 8 * channel & 255) / 255.0;
+      const double cover = (picture.pixels[i] >> 24) / 255.0;
+      planes[channel].values[i] = cover * value + (1 - cover) * background;
+    }
+  }
+  return planes;
+}
+
+/// The luma of ITU-R BT.601.
+Plane greyOf(const ColourPlanes& planes) {
+  Plane grey(planes[0].width, planes[0].height);
+  for (std::size_t i = 0; i < grey.values.size(); ++i)
+    grey.values[i] =
+        0.299 * planes[0].values[i] + 0.587 * planes[1].values[i] + 0.114 * planes[2].values[i];
+  return grey;
+}
+
+double meanOver(const Plane& map, const std::vector<std::size_t>& pixels) {
+  double sum = 0;
+  for (const std::size_t pixel : pixels) sum += map.values[pixel];
+  return sum / static_cast<double>(pixels.size());
+}
+
+std::vector<std::uint8_t> greyPng(const Plane& map) {
+  Picture picture{
+      static_cast<std::uint32_t>(map.width), static_cast<std::uint32_t>(map.height), {}};
+  for (const double value : map.values) {
+    const auto grey = static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 1.0) * 255));
+    picture.pixels.push_back(rgba(grey, grey, grey));
+  }
+  return encodePicture(picture);
+}
+
+/// How much two pictures differ, by three measures.
+class Ssim : public Command {
+ public:
+  void declare(Options& options) override {
+    options.positional("reference", reference_file_, "The picture that it should be (.png)");
+    options.positional("picture", picture_file_, "The picture to judge (.png), of the same size");
+    options.length("pixel", pixel_mm_, "The side of a pixel where it is looked at");
+    options.length("distance", distance_mm_, "How far from there the eye is");
+    options.number("background", background_, 0, 1,
+                   "The grey, sRGB-coded, behind what is transparent");
+    options.text("maps", maps_folder_, "FOLDER",
+                 "Writes the maps as ssim.png, ssim-seen.png (white where alike) and flip.png "
+                 "(black where alike)");
+    options.flag("json", as_json_, "Say it as JSON");
+    options.flag("overwrite", overwrite_, "Replace the folder if it is there");
+  }
+
+  void run() override {
+    for (const auto& [name, value] :
+         {std::pair("--pixel", pixel_mm_), std::pair("--distance", distance_mm_)}) {
+      if (!(value > 0)) throw UsageError(std::string(name) + ": must be more than 0 mm");
+    }
+    const double pixels_per_degree = distance_mm_ / pixel_mm_ * std::numbers::pi / 180;
+    constexpr double least = 5;
+    constexpr double most = 1000;
+    if (!(pixels_per_degree >= least && pixels_per_degree <= most)) {
+      throw UsageError("--pixel and --distance give " + shortestText(pixels_per_degree) +
+                       " pixels per degree; 5 to 1000 can be judged");
+    }
+    if (!maps_folder_.empty())
+      StagedOutput::check(maps_folder_, StagedOutput::Kind::folder, overwrite_);
+
+    const Picture reference = readPicture(reference_file_);
+    const Picture picture = readPicture(picture_file_);
+    if (reference.width != picture.width || reference.height != picture.height) {
+      throw DataError("'" + picture_file_ + "' has " + sizeText(picture) + " pixels and '" +
+                      reference_file_ + "' " + sizeText(reference) +
+                      "; only pictures of one size can be compared");
+    }
+    const std::vector<std::size_t> object = objectPixels(reference);
+    const ColourPlanes a = channelsOf(reference, background_);
+    const ColourPlanes b = channelsOf(picture, background_);
+    const Plane grey_a = greyOf(a);
+    const Plane grey_b = greyOf(b);
+    const Plane plain = structuralSimilarity(grey_a, grey_b);
+    const Plane seen = structuralSimilarity(seenByTheEye(grey_a, pixels_per_degree),
+                                            seenByTheEye(grey_b, pixels_per_degree));
+    const Plane flip = flipDifference(a, b, pixels_per_degree);
+    const std::array<double, 3> means{meanOver(plain, object), meanOver(seen, object),
+                                      meanOver(flip, object)};
+
+    if (!maps_folder_.empty()) {
+      StagedOutput staged(maps_folder_, StagedOutput::Kind::folder);
+      staged.write("ssim.png", greyPng(plain));
+      staged.write("ssim-seen.png", greyPng(seen));
+      staged.write("flip.png", greyPng(flip));
+      staged.commit();
+    }
+    printData(textOf(reference, object.size(), pixels_per_degree, means).c_str());
+  }
+
+ private:
+  static std::string sizeText(const Picture& picture) {
+    return std::to_string(picture.width) + " x " + std::to_string(picture.height);
+  }
+
+  /// Those that the object covers by half; where nothing is transparent, those whose whole window
+  /// lies in the picture.
+  [[nodiscard]] std::vector<std::size_t> objectPixels(const Picture& picture) const {
+    const bool opaque = std::all_of(picture.pixels.begin(), picture.pixels.end(),
+                                    [](std::uint32_t pixel) { return pixel >> 24 == 255; });
+    constexpr std::uint32_t radius = 5;
+    std::vector<std::size_t> pixels;
+    for (std::uint32_t y = 0; y < picture.height; ++y) {
+      for (std::uint32_t x = 0; x < picture.width; ++x) {
+        const std::size_t i = std::size_t{y} * picture.width + x;
+        if (opaque ? std::min(x, y) >= radius && x + radius < picture.width &&
+                         y + radius < picture.height
+                   : picture.pixels[i] >> 24 >= 128)
+          pixels.push_back(i);
+      }
+    }
+    if (!pixels.empty()) return pixels;
+    throw DataError(opaque ? "'" + reference_file_ + "' has " + sizeText(picture) +
+                                 " pixels; 11 x 11 is the least"
+                           : "'" + reference_file_ + "' shows nothing: all of it is transparent");
+  }
+
+  [[nodiscard]] std::string textOf(const Picture& reference, std::size_t object,
+                                   double pixels_per_degree,
+                                   const std::array<double, 3>& means) const {
+    if (as_json_) {
+      return ordered_json{{"reference", reference_file_},
+                          {"picture", picture_file_},
+                          {"width", reference.width},
+                          {"height", reference.height},
+                          {"pixels", object},
+                          {"pixels_per_degree", pixels_per_degree},
+                          {"ssim", means[0]},
+                          {"ssim_seen", means[1]},
+                          {"flip", means[2]}}
+                 .dump(1) +
+             "\n";
+    }
+    std::array<char, 256> text{};
+    std::snprintf(text.data(), text.size(),
+                  "ssim       %.6f\nssim seen  %.6f  at %.1f pixels per degree\nflip       %.6f\n"
+                  "pixels     %zu of %zu\n",
+                  means[0], means[1], pixels_per_degree, means[2], object, reference.pixels.size());
+    return text.data();
+  }
+
+  std::string reference_file_;
+  std::string picture_file_;
+  double pixel_mm_ = 0.0873;
+  double distance_mm_ = 500;
+  double background_ = 0.5;
+  std::string maps_folder_;
+  bool as_json_ = false;
+  bool overwrite_ = false;
+};
+
+}  // namespace
+
+extern const CommandInfo ssim;
+const CommandInfo ssim{
+    "ssim", "How alike two pictures are: SSIM, SSIM of what the eye sees of them, and FLIP",
+    "render part.stl part.png\n"
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! render print.png --frame "
+    "part.stl\n"
+    "ssim part.png print.png",
+    []() -> std::unique_ptr<Command> { return std::make_unique<Ssim>(); }};
+
+}  // namespace vdbdither

@@ -1,0 +1,51 @@
+#include "io/picture.h"
+
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <png.h>
+
+#include "io/png_decoder.h"
+#include "vdbdither/errors.h"
+
+namespace vdbdither {
+
+Picture readPicture(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error))
+    throw DataError("no such file '" + path.string() + "'");
+  std::ifstream stream(path, std::ios::binary);
+  const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), {});
+  if (!stream) throw DataError("cannot read '" + path.string() + "'");
+  RunImage runs;
+  try {
+    runs = decodePng({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+  } catch (const DataError& problem) {
+    throw DataError("'" + path.string() + "' " + problem.what());
+  }
+  Picture picture{runs.width, runs.height, {}};
+  picture.pixels.reserve(std::size_t{runs.width} * runs.height);
+  for (std::uint32_t y = 0; y < runs.height; ++y) {
+    for (const Run& run : runs.row(y))
+      picture.pixels.resize(std::size_t{y} * runs.width + run.end, run.value);
+  }
+  return picture;
+}
+
+std::vector<std::uint8_t> encodePicture(const Picture& picture) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = picture.width;
+  image.height = picture.height;
+  image.format = PNG_FORMAT_RGBA;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::vector<std::uint8_t> bytes(size);
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, picture.pixels.data(), 0,
+                                nullptr) == 0)
+    throw DataError(std::string("the picture cannot be written: ") + image.message);
+  bytes.resize(size);
+  return bytes;
+}
+
+}  // namespace vdbdither

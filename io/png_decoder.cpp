@@ -1,0 +1,78 @@
+#include "io/png_decoder.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <png.h>
+
+#include "vdbdither/errors.h"
+
+namespace vdbdither {
+
+namespace {
+
+/// Errors leave libpng as exceptions: it is told to, and its frames hold nothing to be freed that
+/// its structures do not own.
+class Decoder {
+ public:
+  explicit Decoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {
+    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, refuse, ignore);
+    info_ = png_ ? png_create_info_struct(png_) : nullptr;
+    if (!info_) throw std::bad_alloc();
+    png_set_read_fn(png_, this, read);
+    png_set_user_limits(png_, 1 << 24, 1 << 24);
+  }
+  Decoder(const Decoder&) = delete;
+  Decoder& operator=(const Decoder&) = delete;
+  ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
+
+  RunImage run() {
+    png_read_info(png_, info_);
+    if (png_get_interlace_type(png_, info_) != PNG_INTERLACE_NONE)
+      throw DataError("is interlaced; save it without");
+    png_set_expand(png_);
+    png_set_strip_16(png_);
+    png_set_gray_to_rgb(png_);
+    png_set_add_alpha(png_, 255, PNG_FILLER_AFTER);
+    png_read_update_info(png_, info_);
+    const std::uint32_t width = png_get_image_width(png_, info_);
+    const std::uint32_t height = png_get_image_height(png_, info_);
+    RunsBuilder runs(width);
+    std::vector<std::uint8_t> row(png_get_rowbytes(png_, info_));
+    for (std::uint32_t y = 0; y < height; ++y) {
+      png_read_row(png_, row.data(), nullptr);
+      for (std::uint32_t x = 0; x < width; ++x) {
+        std::uint32_t colour = 0;
+        std::memcpy(&colour, row.data() + std::size_t{4} * x, sizeof colour);
+        runs.pixel(x, colour);
+      }
+      runs.endRow();
+    }
+    png_read_end(png_, nullptr);
+    return runs.finish();
+  }
+
+ private:
+  [[noreturn]] static void refuse(png_structp, png_const_charp text) {
+    throw DataError(std::string("is no readable PNG: ") + text);
+  }
+  static void ignore(png_structp, png_const_charp) {}
+  static void read(png_structp png, png_bytep data, std::size_t size) {
+    auto& self = *static_cast<Decoder*>(png_get_io_ptr(png));
+    if (size > self.bytes_.size()) throw DataError("is no readable PNG: it is cut short");
+    std::copy_n(self.bytes_.begin(), size, data);
+    self.bytes_ = self.bytes_.subspan(size);
+  }
+
+  std::span<const std::uint8_t> bytes_;
+  png_structp png_ = nullptr;
+  png_infop info_ = nullptr;
+};
+
+}  // namespace
+
+RunImage decodePng(std::span<const std::uint8_t> bytes) { return Decoder(bytes).run(); }
+
+}  // namespace vdbdither

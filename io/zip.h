@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace vdbdither {
+
+/// Writes a zip archive whose files are stored as they are; same files, same bytes. Throws
+/// DataError naming `shown`.
+class ZipWriter {
+ public:
+  ZipWriter(const std::filesystem::path& path, std::filesystem::path shown);
+  ZipWriter(const ZipWriter&) = delete;
+  ZipWriter& operator=(const ZipWriter&) = delete;
+  ~ZipWriter();
+
+  /// `name` is in UTF-8, with `/` between folders.
+  void add(const std::string& name, std::span<const std::uint8_t> bytes);
+
+  /// Writes the directory at the end, without which it is no archive.
+  void finish();
+
+ private:
+  [[noreturn]] void fail() const;
+
+  std::filesystem::path shown_;
+  void* file_ = nullptr;
+};
+
+/// Reads files of a zip archive by name. Safe to use from many threads.
+class ZipReader {
+ public:
+  /// Throws DataError for what is no zip archive.
+  explicit ZipReader(const std::filesystem::path& path);
+  ZipReader(const ZipReader&) = delete;
+  ZipReader& operator=(const ZipReader&) = delete;
+  ~ZipReader();
+
+  [[nodiscard]] bool contains(const std::string& name) const { return places_.contains(name); }
+
+  /// The whole file. Throws DataError where it is missing or its checksum is wrong.
+  [[nodiscard]] std::vector<std::uint8_t> read(const std::string& name);
+
+ private:
+  /// Where a file lies: in the archive's directory, and its number there.
+  struct Place {
+    std::uint64_t offset = 0;
+    std::uint64_t number = 0;
+  };
+
+  std::filesystem::path path_;
+  void* file_ = nullptr;
+  std::map<std::string, Place> places_;
+  std::mutex mutex_;
+};
+
+}  // namespace vdbdither

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <openvdb/openvdb.h>
+
+#include "vdbdither/lattice.h"
+
+namespace vdbdither {
+
+/// Which voxels of a layer belong to a set, one bit each: row after row, `BitFrame::words` words to
+/// a row, x rising from the lowest bit of the first word.
+using BitLayer = std::vector<std::uint64_t>;
+
+/// Where the voxels of a box lie in bit layers. At least one voxel around the box, in x and in y,
+/// has a bit too, which is never set.
+class BitFrame {
+ public:
+  explicit BitFrame(const openvdb::CoordBBox& box);
+
+  [[nodiscard]] const openvdb::CoordBBox& box() const { return box_; }
+  [[nodiscard]] int words() const { return words_; }
+  [[nodiscard]] int rows() const { return rows_; }
+  [[nodiscard]] int xBegin() const { return x_begin_; }  ///< of bit 0; a multiple of 8
+  [[nodiscard]] int yBegin() const { return y_begin_; }  ///< of row 0
+
+  [[nodiscard]] BitLayer emptyLayer() const {
+    return BitLayer(static_cast<std::size_t>(words_) * static_cast<std::size_t>(rows_), 0);
+  }
+  /// Where a row begins in a layer.
+  [[nodiscard]] std::size_t row(int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(words_);
+  }
+
+ private:
+  openvdb::CoordBBox box_;
+  int words_;
+  int rows_;
+  int x_begin_;
+  int y_begin_;
+};
+
+/// What of a scalar grid counts as inside: values below the level (distances) or above it
+/// (occupancies).
+enum class Inside { below, above };
+
+/// One bit layer for each of `layers`: the voxels of the frame's box that are active and true.
+std::vector<BitLayer> bitLayers(const openvdb::BoolGrid& grid, const BitFrame& frame,
+                                ZRange layers);
+
+/// The same for the voxels, active or not, whose value is less or greater than `level`.
+std::vector<BitLayer> bitLayers(const openvdb::FloatGrid& grid, const BitFrame& frame,
+                                ZRange layers, Inside inside, float level);
+
+}  // namespace vdbdither

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <openvdb/math/Vec3.h>
+
+#include "vdbdither/mesh.h"
+
+namespace vdbdither {
+
+/// The nearest point of a mesh to a given one.
+struct ClosestPoint {
+  double distance_mm = 0;      ///< negative inside the mesh
+  openvdb::Vec3d point;        ///< on the mesh
+  std::uint32_t triangle = 0;  ///< that it lies on; of several the lowest
+};
+
+/// Exact signed distances from any point to a closed mesh, through a tree of bounding boxes.
+///
+/// The sign is that of the angle-weighted normal where the nearest point lies (Bærentzen, Aanæs:
+/// "Signed Distance Computation Using the Angle Weighted Pseudonormal", 2005), which is right for
+/// every closed mesh that does not pass through itself. In double precision; what is found depends
+/// on the mesh and the point alone.
+class ClosestPoints {
+ public:
+  /// `mesh` in mm, with at least one triangle, outward oriented; see repaired.
+  explicit ClosestPoints(Mesh mesh);
+
+  /// The nearest point to `p`. `hint`: a triangle that may be near, which makes it faster.
+  [[nodiscard]] ClosestPoint operator()(const openvdb::Vec3d& p, std::uint32_t hint = 0) const;
+
+  [[nodiscard]] const Mesh& mesh() const { return mesh_; }
+  /// Unit normal of a triangle; zero where it has no area.
+  [[nodiscard]] const openvdb::Vec3d& normal(std::uint32_t triangle) const {
+    return normals_[triangle];
+  }
+
+ private:
+  struct Node {
+    std::array<float, 3> low, high;  ///< rounded outwards
+    std::uint32_t begin = 0;         ///< of a leaf: in order_; else the second child
+    std::uint32_t count = 0;         ///< of a leaf; else zero, and the first child comes next
+  };
+  struct Candidate;
+
+  std::uint32_t build(std::uint32_t begin, std::uint32_t end,
+                      const std::vector<openvdb::Vec3d>& centres);
+  void findNormals();
+  void consider(std::uint32_t triangle, const openvdb::Vec3d& p, Candidate& best) const;
+
+  Mesh mesh_;
+  std::vector<openvdb::Vec3d> normals_;         ///< by triangle
+  std::vector<openvdb::Vec3d> edge_normals_;    ///< by side, of the two triangles at it
+  std::vector<openvdb::Vec3d> vertex_normals_;  ///< weighted by angle
+  std::vector<std::uint32_t> order_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace vdbdither

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ops/kernels/iso_surface.h"
+#include "vdbdither/grid.h"
+
+namespace vdbdither {
+
+/// The grids that have a surface as it is printed or meant, the furthest down a chain first.
+inline constexpr std::array<std::string_view, 4> surface_grids{"printed", "solid", "displaced",
+                                                               "surface"};
+
+/// `wanted` itself, or of "auto" the first of `surface_grids` that `there` holds. Throws DataError
+/// where it is not there.
+std::string chosenSurfaceGrid(std::span<const std::string> there, const std::string& wanted);
+
+/// The surface that a grid stands for: of a bool grid its voxels, of a level set the level 0, of a
+/// fog volume (an occupancy) the level ½.
+class GridSurface {
+ public:
+  /// `prototype`: a grid of the kind that is to come. `level`: another level, in the grid's own
+  /// unit. Throws DataError where the grid has no surface, or not at that level.
+  GridSurface(const Lattice& lattice, const openvdb::GridBase& prototype,
+              std::optional<double> level);
+
+  /// The next layers; see IsoSurface.
+  SurfacePiece add(const GridConstPtr& grid, ZRange layers);
+  SurfacePiece finish() { return surface_.finish(); }
+
+  /// Which voxels of the layers are inside.
+  [[nodiscard]] std::vector<BitLayer> insideOf(const GridConstPtr& grid, ZRange layers) const;
+  [[nodiscard]] const BitFrame& frame() const { return surface_.frame(); }
+
+ private:
+  static IsoSurface surfaceOf(const Lattice& lattice, const openvdb::GridBase& prototype,
+                              std::optional<double> level);
+
+  IsoSurface surface_;
+};
+
+}  // namespace vdbdither

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <openvdb/openvdb.h>
+
+#include "ops/kernels/bit_layers.h"
+#include "vdbdither/lattice.h"
+#include "vdbdither/mesh.h"
+
+namespace vdbdither {
+
+/// A stretch of a mesh: its vertices follow those of the stretches before it, and its triangles
+/// count all of them.
+struct SurfacePiece {
+  std::vector<openvdb::Vec3d> vertices;  ///< mm
+  std::vector<Mesh::Triangle> triangles;
+  /// The first vertex that the triangles of later pieces may have; earlier ones can be forgotten.
+  std::uint32_t open_from = 0;
+};
+
+/// The surface of voxels, or of a scalar field at a level, by marching cubes, layer by layer.
+///
+/// The mesh is a closed manifold that faces outwards: every side of a triangle is met by exactly
+/// one other, in the opposite direction, and the triangles at a vertex form one ring. It is closed
+/// at the lattice's box, below the first layer and above the last one, as if all beyond were empty
+/// (of a field: its background). Vertices lie on the lines between neighbouring voxel centres, at
+/// least 1/256 of the line from its ends, so that no two of them coincide. Which pieces the layers
+/// come in changes neither the vertices nor the triangles nor their order; memory is a few layers.
+class IsoSurface {
+ public:
+  /// How a field is read between voxel centres.
+  enum class Between {
+    linear,
+    /// Linear in the inverse of the normal distribution, which is exact for a plane convolved with
+    /// a Gaussian: for occupancies.
+    probit
+  };
+
+  /// The surface of voxels: vertices in the middle of the lines.
+  explicit IsoSurface(const Lattice& lattice);
+
+  /// The surface where a field passes `level`. `background`: its value beyond the box, outside.
+  IsoSurface(const Lattice& lattice, Inside inside, float level, float background,
+             Between between = Between::linear);
+
+  /// Takes the next `layers`, on top of those before. Throws DataError where the mesh would have
+  /// more vertices than 32 bits count.
+  SurfacePiece add(const openvdb::BoolGrid::ConstPtr& voxels, ZRange layers);
+  SurfacePiece add(const openvdb::FloatGrid::ConstPtr& field, ZRange layers);
+
+  /// Closes the surface above the last layer.
+  SurfacePiece finish();
+
+  /// Which voxels of the layers are inside.
+  [[nodiscard]] std::vector<BitLayer> insideOf(const openvdb::BoolGrid& voxels,
+                                               ZRange layers) const {
+    return bitLayers(voxels, frame_, layers);
+  }
+  [[nodiscard]] std::vector<BitLayer> insideOf(const openvdb::FloatGrid& field,
+                                               ZRange layers) const {
+    return bitLayers(field, frame_, layers, inside_, level_);
+  }
+  [[nodiscard]] const BitFrame& frame() const { return frame_; }
+
+ private:
+  /// The lines of one kind that the surface cuts, and which vertices they have: `first` of a word
+  /// is that of its lowest bit.
+  struct CutLines {
+    std::vector<std::uint64_t> cut;
+    std::vector<std::uint32_t> first;
+
+    [[nodiscard]] std::uint32_t vertex(std::size_t row, int x) const;
+  };
+  struct Layer {
+    BitLayer inside;
+    CutLines along_x, along_y;
+  };
+  struct Step;
+  class Values;
+
+  SurfacePiece addBits(std::vector<BitLayer> bits, ZRange layers);
+  void march(std::vector<Step>& steps, SurfacePiece& piece);
+  void emitVertices(const Step& step, int row, Values& values, SurfacePiece& piece) const;
+  template <typename Visit>
+  void forEachCell(const Step& step, int row, const Visit& visit) const;
+
+  Lattice lattice_;
+  BitFrame frame_;
+  bool is_field_ = false;
+  Inside inside_ = Inside::below;
+  float level_ = 0;
+  float background_ = 0;
+  Between between_ = Between::linear;
+
+  bool begun_ = false;
+  int next_layer_ = 0;
+  Layer last_;
+  std::uint32_t vertex_count_ = 0;
+  openvdb::FloatGrid::ConstPtr below_, here_;  ///< the field of the last layer, and of the new ones
+  ZRange here_layers_;
+  int first_layer_ = 0;
+};
+
+}  // namespace vdbdither

@@ -1,0 +1,66 @@
+#include "ops/kernels/mesh_placement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "vdbdither/errors.h"
+
+namespace vdbdither {
+
+using openvdb::Vec3d;
+
+namespace {
+
+void rotate(Mesh& mesh, const Vec3d& degrees) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double turn = std::remainder(degrees[axis], 360.0);
+    if (turn == 0) continue;
+    const bool quarters = std::fmod(turn, 90.0) == 0;
+    const double angle = turn * std::numbers::pi / 180;
+    const double cosine = quarters ? std::round(std::cos(angle)) : std::cos(angle);
+    const double sine = quarters ? std::round(std::sin(angle)) : std::sin(angle);
+    const int u = (axis + 1) % 3;
+    const int v = (axis + 2) % 3;
+    for (Vec3d& p : mesh.vertices) {
+      const double turned = cosine * p[u] - sine * p[v];
+      p[v] = sine * p[u] + cosine * p[v];
+      p[u] = turned;
+    }
+  }
+}
+
+}  // namespace
+
+MeshBounds boundsOf(const Mesh& mesh) {
+  MeshBounds bounds{mesh.vertices.front(), mesh.vertices.front()};
+  for (const Vec3d& vertex : mesh.vertices) {
+    bounds.min = openvdb::math::minComponent(bounds.min, vertex);
+    bounds.max = openvdb::math::maxComponent(bounds.max, vertex);
+  }
+  return bounds;
+}
+
+void place(Mesh& mesh, const MeshPlacement& placement) {
+  double factor = placement.factor;
+  rotate(mesh, placement.rotate_degrees);
+  if (placement.fit_mm > 0) {
+    const MeshBounds bounds = boundsOf(mesh);
+    const Vec3d extent = bounds.max - bounds.min;
+    const double longest = std::max({extent.x(), extent.y(), extent.z()});
+    if (!(longest > 0)) throw DataError("--fit: the mesh has no extent");
+    factor = placement.fit_mm / longest;
+  }
+  for (Vec3d& vertex : mesh.vertices) vertex *= factor;
+  if (!placement.on_bed) return;
+  const Vec3d corner = boundsOf(mesh).min;
+  for (Vec3d& vertex : mesh.vertices) vertex -= corner;
+}
+
+double unitMm(std::string_view unit) {
+  return std::find_if(units_mm.begin(), units_mm.end(),
+                      [&](const auto& known) { return known.first == unit; })
+      ->second;
+}
+
+}  // namespace vdbdither

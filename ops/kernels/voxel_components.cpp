@@ -1,0 +1,171 @@
+#include "ops/kernels/voxel_components.h"
+
+#include <algorithm>
+#include <bit>
+#include <functional>
+#include <numeric>
+#include <span>
+#include <utility>
+
+namespace vdbdither {
+
+namespace {
+
+constexpr int word_bits = 64;
+
+/// Calls visit(begin, end) for every run of set bits of a row, or with `flip` of unset ones.
+template <typename Visit>
+void forEachRun(const std::uint64_t* row, int words, bool flip, const Visit& visit) {
+  const std::uint64_t mask = flip ? ~std::uint64_t{0} : 0;
+  int begin = -1;
+  for (int word = 0; word < words; ++word) {
+    const std::uint64_t bits = row[word] ^ mask;
+    for (int at = 0; at < word_bits;) {
+      // The distance to the next change.
+      const std::uint64_t rest = (begin < 0 ? bits : ~bits) >> at;
+      if (rest == 0) break;
+      at += std::countr_zero(rest);
+      const int x = word * word_bits + at;
+      if (begin < 0) {
+        begin = x;
+      } else {
+        visit(begin, x);
+        begin = -1;
+      }
+    }
+  }
+  if (begin >= 0) visit(begin, words * word_bits);
+}
+
+/// Sets of numbers that are joined one by one.
+class Sets {
+ public:
+  explicit Sets(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0U);
+  }
+  std::uint32_t find(std::uint32_t n) {
+    while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
+    return n;
+  }
+  /// The lower number stands for both.
+  void join(std::uint32_t a, std::uint32_t b) {
+    a = find(a);
+    b = find(b);
+    if (a != b) parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+/// Calls join(a, b) for the runs of two rows that touch; `aside` is 1 where corners do.
+template <typename Run, typename Join>
+void forEachTouching(std::span<const Run> a, std::span<const Run> b, int aside, const Join& join) {
+  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+    if (a[i].begin < b[j].end + aside && b[j].begin < a[i].end + aside) join(i, j);
+    if (a[i].end < b[j].end) {
+      ++i;
+    } else {
+      ++j;
+    }
+  }
+}
+
+}  // namespace
+
+VoxelComponents::VoxelComponents(const BitFrame& frame) : frame_(frame) { full_.diagonal = true; }
+
+void VoxelComponents::add(const BitLayer& layer) {
+  // The outside lies below the first layer too.
+  if (!std::exchange(begun_, true)) addLayer(frame_.emptyLayer());
+  addLayer(layer);
+}
+
+VoxelComponents::Counts VoxelComponents::finish() {
+  Counts counts;
+  if (!begun_) return counts;
+  addLayer(frame_.emptyLayer());
+  const auto sorted = [](std::vector<std::uint64_t> sizes) {
+    std::sort(sizes.begin(), sizes.end(), std::greater<>());
+    return sizes;
+  };
+  // What is open at the end is the outside.
+  counts.components = sorted(std::move(full_.closed));
+  counts.cavities = sorted(std::move(empty_.closed));
+  return counts;
+}
+
+void VoxelComponents::addLayer(const BitLayer& layer) {
+  for (Pieces* pieces : {&full_, &empty_}) {
+    std::vector<Run> runs;
+    std::vector<std::size_t> rows{0};
+    for (int row = 0; row < frame_.rows(); ++row) {
+      forEachRun(layer.data() + frame_.row(row), frame_.words(), pieces == &empty_,
+                 [&](int begin, int end) {
+                   runs.push_back({begin, end, 0});
+                 });
+      rows.push_back(runs.size());
+    }
+    addRuns(*pieces, std::move(runs), std::move(rows));
+  }
+}
+
+void VoxelComponents::addRuns(Pieces& pieces, std::vector<Run> runs,
+                              std::vector<std::size_t> rows) const {
+  const auto before = static_cast<std::uint32_t>(pieces.open.size());
+  Sets sets(before + runs.size());
+  const int reach = pieces.diagonal ? 1 : 0;
+  const auto rowOf = [](const std::vector<Run>& of, const std::vector<std::size_t>& begins,
+                        int row) -> std::span<const Run> {
+    const auto n = static_cast<std::size_t>(row);
+    if (row < 0 || n + 1 >= begins.size()) return {};
+    return {of.data() + begins[n], begins[n + 1] - begins[n]};
+  };
+  for (int row = 0; row < frame_.rows(); ++row) {
+    const std::span<const Run> here = rowOf(runs, rows, row);
+    const auto number = [&](std::size_t begin, std::size_t n) {
+      return before + static_cast<std::uint32_t>(begin + n);
+    };
+    const std::size_t first = rows[static_cast<std::size_t>(row)];
+    if (row > 0) {
+      const std::size_t first_above = rows[static_cast<std::size_t>(row - 1)];
+      forEachTouching(here, rowOf(runs, rows, row - 1), reach, [&](std::size_t i, std::size_t j) {
+        sets.join(number(first, i), number(first_above, j));
+      });
+    }
+    for (int other = row - reach; other <= row + reach; ++other) {
+      const std::span<const Run> below = rowOf(pieces.runs, pieces.rows, other);
+      forEachTouching(here, below, reach, [&](std::size_t i, std::size_t j) {
+        sets.join(number(first, i), below[j].piece);
+      });
+    }
+  }
+
+  // Pieces that go on get new numbers, the others end.
+  constexpr auto none = ~std::uint32_t{0};
+  std::vector<std::uint32_t> renamed(before + runs.size(), none);
+  std::vector<std::uint64_t> open;
+  for (std::size_t n = 0; n < runs.size(); ++n) {
+    const std::uint32_t root = sets.find(before + static_cast<std::uint32_t>(n));
+    if (renamed[root] == none) {
+      renamed[root] = static_cast<std::uint32_t>(open.size());
+      open.push_back(0);
+    }
+    runs[n].piece = renamed[root];
+    open[runs[n].piece] += static_cast<std::uint64_t>(runs[n].end - runs[n].begin);
+  }
+  for (std::uint32_t piece = 0; piece < before; ++piece) {
+    const std::uint32_t to = renamed[sets.find(piece)];
+    if (to == none) {
+      // Pieces of before can only have been joined by runs of now.
+      pieces.closed.push_back(pieces.open[piece]);
+    } else {
+      open[to] += pieces.open[piece];
+    }
+  }
+  pieces.runs = std::move(runs);
+  pieces.rows = std::move(rows);
+  pieces.open = std::move(open);
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,93 @@
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "io/printer_profile.h"
+#include "ops/kernels/gaussian_spread.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/find_grid.h"
+#include "vdbdither/openvdb.h"
+#include "vdbdither/operator.h"
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::Vec3d;
+
+/// `printed` from `solid`.
+class Simulate : public Filter {
+ public:
+  void declare(Options& options) override {
+    options.text("spread", spread_text_, "MM|X,Y,Z",
+                 "How far a droplet spreads: standard deviation of a Gaussian, one length or one "
+                 "for each axis; by default what the printer's profile states, or else 50um");
+  }
+
+  Schema plan(const Schema& in) override {
+    const auto solid = findGrid<openvdb::BoolGrid>(in.grids, "solid");
+    box_ = in.lattice.box;
+    spread_.emplace(in.lattice.pitch_mm, spreadMm(in));
+    constexpr int furthest = 500;
+    const openvdb::Coord reach = spread_->reach();
+    if (std::max({reach.x(), reach.y(), reach.z()}) > furthest)
+      throw UsageError("--spread: droplets would reach over more than " + std::to_string(furthest) +
+                       " voxels");
+    Schema out = in;
+    out.grids["printed"] = makePrintedGrid(solid->transform());
+    return out;
+  }
+
+  [[nodiscard]] std::vector<Read> reads() const override {
+    return {{"solid", Reach::stencil(spread_->reach().z())}};
+  }
+
+  [[nodiscard]] Grids run(const Slab& in) const override {
+    return {{"printed", spread_->run(*findGrid<openvdb::BoolGrid>(in.grids, "solid"), box_, in.core,
+                                     in.valid)}};
+  }
+
+ private:
+  [[nodiscard]] Vec3d spreadMm(const Schema& in) const {
+    constexpr double usual_mm = 0.05;
+    if (spread_text_.empty()) {
+      const auto profile = in.metadata.find("vdbdither:printer");
+      if (profile == in.metadata.end()) return Vec3d(usual_mm);
+      const Vec3d stated = printerProfileFromJson(profile->second).point_spread_mm;
+      return stated.isZero() ? Vec3d(usual_mm) : stated;
+    }
+    Vec3d spread_mm;
+    int count = 0;
+    for (std::size_t begin = 0; begin <= spread_text_.size();) {
+      const std::size_t comma = std::min(spread_text_.find(',', begin), spread_text_.size());
+      if (count == 3) refuse();
+      spread_mm[count++] = parseLengthMm(spread_text_.substr(begin, comma - begin));
+      begin = comma + 1;
+    }
+    if (count == 2) refuse();
+    if (count == 1) spread_mm = Vec3d(spread_mm[0]);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(spread_mm[axis] >= 0)) refuse();
+    }
+    return spread_mm;
+  }
+
+  [[noreturn]] void refuse() const {
+    throw UsageError("--spread: '" + spread_text_ +
+                     "' is neither a length such as 50um nor three of them");
+  }
+
+  std::string spread_text_;
+  openvdb::CoordBBox box_;
+  std::optional<GaussianSpread> spread_;
+};
+
+}  // namespace
+
+extern const OperatorInfo simulate;
+const OperatorInfo simulate{
+    "simulate", "What the printer makes of the voxels: the share of material after droplets spread",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! mesh-export print.stl",
+    []() -> std::unique_ptr<Operator> { return std::make_unique<Simulate>(); }};
+
+}  // namespace vdbdither

@@ -1,0 +1,79 @@
+#include "io/tiff.h"
+
+#include <tiffio.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "io/png_runs.h"
+#include "io/staged_output.h"
+#include "tests/support/run_images.h"
+#include "tests/support/scratch_folder.h"
+#include "vdbdither/errors.h"
+
+namespace vdbdither {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+const std::vector<std::uint32_t> palette = {rgba(0, 0, 0), rgba(240, 10, 20), rgba(1, 2, 3)};
+
+std::uint32_t stripes(int x, int y) { return static_cast<std::uint32_t>((x / 3 + y) % 3); }
+
+TEST(Tiff, PalettesKeepIndicesAndColours) {
+  const test::ScratchFolder scratch;
+  const auto bytes = encodeTiff(test::runImage(37, 70, stripes), {palette, 0.042, 0.084});
+  writeFile(scratch / "a.tif", bytes, "a.tif");
+  TIFF* tiff = TIFFOpen((scratch / "a.tif").c_str(), "r");
+  ASSERT_NE(tiff, nullptr);
+  float across = 0;
+  TIFFGetField(tiff, TIFFTAG_XRESOLUTION, &across);
+  EXPECT_FLOAT_EQ(across, 10 / 0.042F);
+  std::vector<std::uint32_t> raster(37 * 70);
+  ASSERT_EQ(TIFFReadRGBAImageOriented(tiff, 37, 70, raster.data(), ORIENTATION_TOPLEFT, 1), 1);
+  TIFFClose(tiff);
+  for (int y = 0; y < 70; ++y) {
+    for (int x = 0; x < 37; ++x)
+      ASSERT_EQ(raster[y * 37 + x], palette[stripes(x, y)]) << x << " " << y;
+  }
+  EXPECT_EQ(decodeTiff(bytes), test::runImage(37, 70, stripes));
+}
+
+TEST(Tiff, BitsComeBack) {
+  for (const int width : {1, 7, 8, 9, 641}) {
+    const auto bit = [](int x, int y) {
+      return static_cast<std::uint32_t>((x * x + 3 * y) % 5 < 2);
+    };
+    const RunImage image = test::runImage(width, 20, bit);
+    const auto bytes = encodeTiff(image, {{}, 1, 1});
+    EXPECT_EQ(decodeTiff(bytes), image) << width;
+    EXPECT_EQ(bytes, encodeTiff(image, {{}, 1, 1}));
+  }
+}
+
+TEST(Tiff, RefusesWhatItCannotReadOrWrite) {
+  auto bytes = encodeTiff(test::runImage(37, 70, stripes), {palette, 1, 1});
+  const std::vector<std::uint8_t> text = {'n', 'o', 'n', 'e'};
+  EXPECT_THAT([&] { decodeTiff(text); },
+              ThrowsMessage<DataError>(HasSubstr("is no readable TIFF: ")));
+  for (const std::size_t size : {100, 50, 8, 7, 0}) {
+    bytes.resize(size);
+    EXPECT_THAT([&] { decodeTiff(bytes); },
+                ThrowsMessage<DataError>(HasSubstr("is no readable TIFF: ")));
+  }
+  EXPECT_THAT(
+      [&] {
+        encodeTiff(RunImage{}, {palette, 1, 1});
+      },
+      ThrowsMessage<DataError>("an image without pixels is no TIFF"));
+  const std::vector<std::uint32_t> many(257);
+  EXPECT_THAT(
+      [&] {
+        encodeTiff(test::runImage(2, 2, stripes), {many, 1, 1});
+      },
+      ThrowsMessage<DataError>("a TIFF has at most 256 colours"));
+}
+
+}  // namespace
+}  // namespace vdbdither

@@ -1,0 +1,163 @@
+#include <fstream>
+#include <memory>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "io/picture.h"
+#include "tests/support/drawn_grids.h"
+#include "tests/support/filters.h"
+#include "tests/support/mesh_files.h"
+#include "tests/support/png_reader.h"
+#include "tests/support/scratch_folder.h"
+#include "tests/support/shapes.h"
+#include "vdbdither/errors.h"
+#include "vdbdither/registry.h"
+
+namespace vdbdither {
+namespace {
+
+using openvdb::BoolGrid;
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::Vec3d;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// Hears nothing.
+class Silent : public Reporter {
+ public:
+  void warn(const std::string&) override {}
+  void count(const std::string&, double) override {}
+  void progress(double) override {}
+};
+
+struct Rendering {
+  explicit Rendering(const std::vector<std::string>& arguments)
+      : made(findOperator("render").make()) {
+    Options options;
+    made->declare(options);
+    options.parse(arguments);
+    made->setReporter(&silent);
+  }
+  Sink& sink() const { return static_cast<Sink&>(*made); }
+  void run(const Schema& schema = {}, int height = 8) const {
+    sink().plan(schema);
+    if (!sink().standsAlone()) {
+      for (const Slab& slab : test::cutIntoSlabs(schema.grids, schema.lattice, height))
+        sink().write(slab);
+    }
+    sink().finish();
+  }
+  Silent silent;
+  std::unique_ptr<Operator> made;
+};
+
+/// A scratch folder with a part: a box of 2 × 1 × 1 mm.
+class Render : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string bytes = test::binaryStl(test::boxMesh({0, 0, 0}, {2, 1, 1}));
+    std::ofstream(scratch / "part.stl", std::ios::binary)
+        .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  }
+  [[nodiscard]] std::string file(const std::string& name) const { return scratch / name; }
+
+  test::ScratchFolder scratch;
+};
+
+const std::vector<std::string> from_above{"--elevation",  "90",           "--azimuth", "0",
+                                          "--projection", "orthographic", "--pixel",   "0.1"};
+
+std::vector<std::string> with(std::vector<std::string> words,
+                              const std::vector<std::string>& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+TEST_F(Render, AMeshOfItsOwnIsDrawnWithoutAChain) {
+  const Rendering rendering(with({file("part.stl"), file("part.png")}, from_above));
+  EXPECT_TRUE(rendering.sink().standsAlone());
+  rendering.run();
+  const Picture picture = readPicture(scratch / "part.png");
+  EXPECT_EQ(picture.width, 20U + 16U);
+  EXPECT_EQ(picture.height, 10U + 16U);
+  EXPECT_EQ(picture.pixels.front(), 0U) << "around it nothing";
+  const std::uint32_t middle = picture.pixels[13 * 36 + 18];
+  EXPECT_EQ(middle >> 24, 255U);
+  // Linear 0.6 is 203 in sRGB.
+  EXPECT_NEAR(middle & 255, 203, 1);
+  EXPECT_EQ(middle & 255, middle >> 8 & 255);
+}
+
+TEST_F(Render, BrightnessIsWhatAHorizontalPlaceBecomes) {
+  Rendering(with({file("part.stl"), file("part.png"), "--brightness", "0.2140411"}, from_above))
+      .run();
+  EXPECT_NEAR(readPicture(scratch / "part.png").pixels[13 * 36 + 18] & 255, 127.5, 1);
+}
+
+TEST_F(Render, VoxelsAreDrawnAsTheyComeInSlabsOfAnyHeight) {
+  const Lattice lattice{{0.1, 0.1, 0.05}, {0, 0, 0}, CoordBBox(Coord(-4), Coord(30))};
+  const auto solid = BoolGrid::create(false);
+  solid->setName("solid");
+  solid->tree().sparseFill(CoordBBox(Coord(0, 0, 0), Coord(19, 9, 19)), true);
+  const Schema schema = test::schemaOf(lattice, {{"solid", solid}});
+  std::vector<std::vector<std::uint8_t>> pictures;
+  for (const int height : {8, 16, 1000}) {
+    Rendering({file("print.png"), "--frame", file("part.stl"), "--overwrite"}).run(schema, height);
+    pictures.push_back(test::fileBytes(scratch / "print.png"));
+  }
+  EXPECT_EQ(pictures[1], pictures[0]);
+  EXPECT_EQ(pictures[2], pictures[0]);
+}
+
+TEST_F(Render, AFrameMakesPicturesComparable) {
+  const std::string bytes = test::binaryStl(test::boxMesh({0.5, 0.25, 0}, {1, 0.75, 0.5}));
+  std::ofstream(scratch / "small.stl", std::ios::binary)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  Rendering({file("part.stl"), file("part.png")}).run();
+  Rendering({file("small.stl"), file("framed.png"), "--frame", file("part.stl")}).run();
+  Rendering({file("small.stl"), file("own.png")}).run();
+  const Picture part = readPicture(scratch / "part.png");
+  const Picture framed = readPicture(scratch / "framed.png");
+  EXPECT_EQ(std::pair(framed.width, framed.height), std::pair(part.width, part.height));
+  EXPECT_LT(readPicture(scratch / "own.png").width, part.width);
+}
+
+TEST_F(Render, AnExrHoldsTheLightTimesTheCover) {
+  Rendering(with({file("part.stl"), file("part.exr")}, from_above)).run();
+  const std::vector<std::uint8_t> bytes = test::fileBytes(scratch / "part.exr");
+  ASSERT_GT(bytes.size(), 4U);
+  EXPECT_EQ((std::vector<std::uint8_t>{0x76, 0x2f, 0x31, 0x01}),
+            std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + 4));
+}
+
+TEST_F(Render, RefusesWhatCannotBeDrawn) {
+  const auto plan = [&](const std::vector<std::string>& arguments, const Schema& in = {}) {
+    return [=] { Rendering(arguments).sink().plan(in); };
+  };
+  const std::string words = "name the picture to write, and before it at most one mesh to draw";
+  EXPECT_THAT(plan({"a.stl", "b.stl", "c.png"}), ThrowsMessage<UsageError>(words));
+  EXPECT_THAT(plan({"a.stl", "b.jpg"}), ThrowsMessage<UsageError>("'b.jpg' is no .png or .exr"));
+  EXPECT_THAT(plan({"a.stl", "b.png", "--pixel", "0"}),
+              ThrowsMessage<UsageError>("--pixel: must be more than 0 mm"));
+  EXPECT_THAT(plan({"a.stl", "b.png", "--distance", "0"}),
+              ThrowsMessage<UsageError>("--distance: must be more than 0 mm"));
+  EXPECT_THAT(plan({"a.stl", file("b.png"), "--frame", file("none.stl")}),
+              ThrowsMessage<DataError>(HasSubstr("no such file")));
+  EXPECT_THAT(plan({file("b.png")}), ThrowsMessage<DataError>(HasSubstr("there is none")));
+  std::ofstream(scratch / "there.png") << "x";
+  EXPECT_THAT(plan({file("part.stl"), file("there.png")}),
+              ThrowsMessage<UsageError>(HasSubstr("exists; --overwrite replaces it")));
+  const auto nothing = BoolGrid::create(false);
+  nothing->setName("solid");
+  const Lattice lattice{{0.1, 0.1, 0.05}, {0, 0, 0}, CoordBBox(Coord(0), Coord(15))};
+  EXPECT_THAT(
+      [&] {
+        Rendering({file("n.png")}).run(test::schemaOf(lattice, {{"solid", nothing}}));
+      },
+      ThrowsMessage<DataError>("grid 'solid' has no surface: nothing of it is inside"));
+}
+
+}  // namespace
+}  // namespace vdbdither

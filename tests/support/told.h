@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vdbdither/operator.h"
+
+namespace vdbdither::test {
+
+/// Keeps what an operator tells.
+class Listener : public Reporter {
+ public:
+  void warn(const std::string& text) override { warnings.push_back(text); }
+  void count(const std::string&, double) override {}
+  void progress(double) override {}
+  void print(const std::string& text) override { printed += text; }
+
+  std::vector<std::string> warnings;
+  std::string printed;
+};
+
+}  // namespace vdbdither::test
