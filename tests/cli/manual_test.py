@@ -19,7 +19,7 @@ class Manual(ProgramTest):
 
     def test_help_all_has_a_line_for_every_verb(self):
         said = self.succeed("help", "all").decode()
-        for name in [*operators(), "printers"]:
+        for name in [*operators(), "printers", "ssim"]:
             self.assertRegex(said, rf"(?m)^{name} +\S")
 
     def test_the_committed_pages_are_those_of_the_program(self):
