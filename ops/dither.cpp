@@ -3,7 +3,9 @@
 #include <filesystem>
 
 #include "io/data_files.h"
+#include "io/mask_cache.h"
 #include "io/vdb.h"
+#include "ops/kernels/mask_tile.h"
 #include "ops/kernels/shape_dither.h"
 #include "ops/kernels/solid.h"
 #include "ops/kernels/threshold_mask.h"
@@ -35,15 +37,19 @@ ThresholdMask readMask(const std::filesystem::path& path) {
 class Dither : public Filter {
  public:
   void declare(Options& options) override {
-    options.text("mask", mask_, "blue|white|none|FILE.vdb",
-                 "Thresholds: the installed blue noise, white noise, none (plain voxels), or a "
-                 "tile of your own");
+    options.text("mask", mask_, "blue|paper|white|none|FILE.vdb",
+                 "Thresholds: the installed blue noise, the paper's, white noise, none (plain "
+                 "voxels), or a tile of your own");
+    options.number("sigma", sigma_, 0, 16,
+                   "Another standard deviation of the blue noise, voxels, at least 0.3; made once "
+                   "and kept in the cache folder");
+    options.integer("size", size_, 0, 256, "Another period of the blue noise, voxels; likewise");
     options.number("amplitude", amplitude_, 0, 8,
                    "Half of it voxel diameters peak to peak, along the normal");
     options.choice("at", at_, {"closest", "foot", "voxel"},
                    "Where the mask is read: at the closest surface voxel, at the voxel of the foot "
                    "point, or at the voxel itself");
-    options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the white noise");
+    options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the noise");
     options.flag("displaced", displaced_,
                  "Adds the grid 'displaced', the displaced distances in mm");
   }
@@ -92,15 +98,42 @@ class Dither : public Filter {
 
  private:
   [[nodiscard]] ThresholdMask mask() const {
+    if (mask_ != "blue" && mask_ != "paper") {
+      for (const auto& [option, given] :
+           {std::pair("--sigma", sigma_ != 0), {"--size", size_ != 0}})
+        if (given)
+          throw UsageError(std::string(option) + ": of the blue noise, and --mask is '" + mask_ +
+                           "'; blue and paper take it");
+    }
     if (mask_ == "none") return ThresholdMask::constant(0.5F);
     if (mask_ == "white") return ThresholdMask::whiteNoise(static_cast<std::uint64_t>(seed_));
-    if (mask_ != "blue") return readMask(mask_);
+    if (mask_ != "blue" && mask_ != "paper") return readMask(mask_);
+    if (mask_ == "paper" || sigma_ != 0 || size_ != 0 || seed_ != 1) return madeMask();
     const auto installed = findDataFile("masks/blue.vdb");
     if (!installed)
       throw UsageError(
           "--mask: the default mask 'masks/blue.vdb' is in no data folder; give a file or --mask "
           "white");
     return readMask(*installed);
+  }
+
+  /// Out of the user's cache, or new.
+  [[nodiscard]] ThresholdMask madeMask() const {
+    VoidAndCluster settings = mask_ == "paper" ? paperMask() : defaultMask();
+    if (sigma_ != 0) {
+      if (sigma_ < 0.3) {
+        throw UsageError("--sigma: " + shortestText(sigma_) +
+                         " is out of range; 0.3 to 16 are accepted");
+      }
+      settings.kernel.sigma = openvdb::Vec3d(sigma_);
+    }
+    if (size_ != 0) settings.size = openvdb::Coord(size_);
+    settings.seed = static_cast<std::uint64_t>(seed_);
+    const auto make = [&] {
+      return maskOf(settings, [this](double fraction) { report().progress(fraction); });
+    };
+    return ThresholdMask(*cachedMask(*emptyMask(settings), make,
+                                     [this](const std::string& text) { report().warn(text); }));
   }
 
   /// The distances must reach as far as the displacements, and the surface voxels must have theirs.
@@ -113,6 +146,8 @@ class Dither : public Filter {
   }
 
   std::string mask_ = "blue";
+  double sigma_ = 0;
+  int size_ = 0;
   double amplitude_ = 4;
   std::string at_ = "closest";
   int seed_ = 1;

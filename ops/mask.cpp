@@ -3,9 +3,8 @@
 #include <cmath>
 #include <mutex>
 
-#include "ops/kernels/void_and_cluster.h"
+#include "ops/kernels/mask_tile.h"
 #include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {
@@ -87,47 +86,18 @@ class Mask : public Source {
 
   [[nodiscard]] Grids run(ZRange core) const override {
     std::call_once(made_, [&] { ranks_ = makeRanks(); });
-    const Coord size = tileSize();
     const openvdb::FloatGrid::Ptr grid = emptyGrid();
-    openvdb::FloatGrid::Accessor voxels = grid->getAccessor();
-    const auto count = static_cast<double>(ranks_.size());
-    const ZRange layers = intersection(core, {0, size.z()});
-    for (int z = layers.begin; z < layers.end; ++z) {
-      const std::uint32_t* rank = ranks_.data() + static_cast<std::size_t>(z) * size.y() * size.x();
-      for (int y = 0; y < size.y(); ++y) {
-        for (int x = 0; x < size.x(); ++x)
-          voxels.setValue(Coord(x, y, z), static_cast<float>((*rank++ + 0.5) / count));
-      }
-    }
+    const ZRange layers = intersection(core, {0, tileSize().z()});
+    if (!layers.empty()) addThresholds(ranks_, layers.begin, layers.end, *grid);
     return {{"mask", grid}};
   }
 
  private:
   [[nodiscard]] Coord tileSize() const { return Coord::floor(size_); }
 
-  [[nodiscard]] openvdb::FloatGrid::Ptr emptyGrid() const {
-    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0.0f);
-    grid->setName("mask");
-    grid->insertMeta("mask:size", openvdb::Vec3IMetadata(tileSize().asVec3i()));
-    grid->insertMeta("mask:kind", openvdb::StringMetadata(kind_));
-    if (kind_ != "bayer") grid->insertMeta("mask:seed", openvdb::Int32Metadata(seed_));
-    if (kind_ == "void-and-cluster") {
-      grid->insertMeta("mask:kernel", openvdb::StringMetadata(kernel_));
-      grid->insertMeta("mask:sigma", openvdb::Vec3DMetadata(sigma_));
-      if (kernel_ == "axis-mix") {
-        grid->insertMeta("mask:plane_sigma", openvdb::DoubleMetadata(plane_sigma_));
-        grid->insertMeta("mask:space_weight", openvdb::DoubleMetadata(space_weight_));
-      }
-    }
-    return grid;
-  }
-
-  [[nodiscard]] std::vector<std::uint32_t> makeRanks() const {
-    const Coord size = tileSize();
-    if (kind_ == "bayer") return bayerRanks(size);
-    if (kind_ == "white") return randomPermutation(size.x() * size.y() * size.z(), seed_);
+  [[nodiscard]] VoidAndCluster settings() const {
     VoidAndCluster settings;
-    settings.size = size;
+    settings.size = tileSize();
     settings.kernel.shape = kernel_ == "peters"  ? MaskKernel::Shape::peters
                             : kernel_ == "gauss" ? MaskKernel::Shape::gauss
                                                  : MaskKernel::Shape::axis_mix;
@@ -135,7 +105,21 @@ class Mask : public Source {
     settings.kernel.plane_sigma = plane_sigma_;
     settings.kernel.space_weight = space_weight_;
     settings.seed = seed_;
-    return voidAndCluster(settings, [this](double fraction) { report().progress(fraction); });
+    return settings;
+  }
+
+  [[nodiscard]] openvdb::FloatGrid::Ptr emptyGrid() const {
+    if (kind_ == "void-and-cluster") return emptyMask(settings());
+    openvdb::FloatGrid::Ptr grid = emptyMask(tileSize(), kind_);
+    if (kind_ != "bayer") grid->insertMeta("mask:seed", openvdb::Int32Metadata(seed_));
+    return grid;
+  }
+
+  [[nodiscard]] std::vector<std::uint32_t> makeRanks() const {
+    const Coord size = tileSize();
+    if (kind_ == "bayer") return bayerRanks(size);
+    if (kind_ == "white") return randomPermutation(size.x() * size.y() * size.z(), seed_);
+    return voidAndCluster(settings(), [this](double fraction) { report().progress(fraction); });
   }
 
   openvdb::Vec3d size_{128, 128, 128};
