@@ -3,6 +3,7 @@
 #include <cmath>
 #include <mutex>
 
+#include "ops/kernels/gradient_noise.h"
 #include "ops/kernels/mask_tile.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/operator.h"
@@ -41,8 +42,10 @@ class Mask : public Source {
  public:
   void declare(Options& options) override {
     options.triple("size", size_, "N", "Period of the tile along x, y, z, voxels, 1 to 256");
-    options.choice("kind", kind_, {"void-and-cluster", "white", "bayer"},
-                   "How the ranks are ordered: blue noise, white noise, or ordered dither");
+    options.choice(
+        "kind", kind_, {"void-and-cluster", "white", "bayer", "gradient-noise"},
+        "How the ranks are ordered: blue noise, white noise, ordered dither, or Perlin's "
+        "noise");
     options.choice("kernel", kernel_, {"peters", "gauss", "axis-mix"},
                    "Void and cluster: the Gaussian filtered on the DFT, sampled, or mixed with its "
                    "lattice planes");
@@ -52,6 +55,7 @@ class Mask : public Source {
                    "axis-mix: standard deviation in the lattice planes, voxels");
     options.number("space-weight", space_weight_, 0, 1e6,
                    "axis-mix: weight of the Gaussian in space");
+    options.integer("cell", cell_, 2, 128, "Gradient noise: edge of its cells, voxels");
     options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the random start");
   }
 
@@ -65,6 +69,10 @@ class Mask : public Source {
       if (kind_ == "bayer" && !std::has_single_bit(static_cast<unsigned>(edge))) {
         throw UsageError("--size: " + shortestText(edge) +
                          " is no power of two, which --kind bayer needs");
+      }
+      if (kind_ == "gradient-noise" && static_cast<int>(edge) % cell_ != 0) {
+        throw UsageError("--size: " + shortestText(edge) + " is no multiple of --cell " +
+                         std::to_string(cell_));
       }
       if (!(sigma_[axis] >= 0.3 && sigma_[axis] <= 16)) {
         throw UsageError("--sigma: " + shortestText(sigma_[axis]) +
@@ -81,7 +89,9 @@ class Mask : public Source {
   [[nodiscard]] double memoryBytes() const override {
     const Coord size = tileSize();
     const double ranks = 4.0 * size.x() * size.y() * size.z();
-    return kind_ == "void-and-cluster" ? 8 * ranks : 2 * ranks;
+    return kind_ == "void-and-cluster" ? 8 * ranks
+           : kind_ == "gradient-noise" ? 5 * ranks
+                                       : 2 * ranks;
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {
@@ -111,6 +121,7 @@ class Mask : public Source {
   [[nodiscard]] openvdb::FloatGrid::Ptr emptyGrid() const {
     if (kind_ == "void-and-cluster") return emptyMask(settings());
     openvdb::FloatGrid::Ptr grid = emptyMask(tileSize(), kind_);
+    if (kind_ == "gradient-noise") grid->insertMeta("mask:cell", openvdb::Int32Metadata(cell_));
     if (kind_ != "bayer") grid->insertMeta("mask:seed", openvdb::Int32Metadata(seed_));
     return grid;
   }
@@ -118,6 +129,7 @@ class Mask : public Source {
   [[nodiscard]] std::vector<std::uint32_t> makeRanks() const {
     const Coord size = tileSize();
     if (kind_ == "bayer") return bayerRanks(size);
+    if (kind_ == "gradient-noise") return gradientNoiseRanks(size, cell_, seed_);
     if (kind_ == "white") return randomPermutation(size.x() * size.y() * size.z(), seed_);
     return voidAndCluster(settings(), [this](double fraction) { report().progress(fraction); });
   }
@@ -126,8 +138,9 @@ class Mask : public Source {
   std::string kind_ = "void-and-cluster";
   std::string kernel_ = "peters";
   openvdb::Vec3d sigma_{1.1, 1.1, 1.1};
-  double plane_sigma_ = 2.1;
-  double space_weight_ = 10;
+  double plane_sigma_ = 2.3;
+  double space_weight_ = 2;
+  int cell_ = 4;
   int seed_ = 1;
   mutable std::once_flag made_;
   mutable std::vector<std::uint32_t> ranks_;

@@ -71,6 +71,8 @@ FloatGrid::Ptr maskOf(const VoidAndCluster& settings,
 VoidAndCluster defaultMask() {
   VoidAndCluster settings;
   settings.size = Coord(64);
+  settings.kernel.shape = MaskKernel::Shape::axis_mix;
+  settings.kernel.sigma = openvdb::Vec3d(0.8);
   return settings;
 }
 

@@ -3,7 +3,7 @@
 
 mask_facets.py RESULT.json MASK.vdb...
 
-A plane tilted against each lattice axis is dithered as `dither --at foot` does it (a voxel is printed where
+A plane, tilted against each lattice axis or with a normal anywhere on the sphere, is dithered as `dither --at foot` does it (a voxel is printed where
 d + amplitude · k_D · (M(foot voxel) - ½) < 0), its height along the axis is compared with the plane, and the difference is
 spread over the facet by a Gaussian. The figure is the root mean square of what is left, µm along the normal. Every mask meets
 the same facets: `positions` of them per axis and tilt, the azimuth and the offset drawn at random.
@@ -33,24 +33,28 @@ def tile(path):
     return values
 
 
-def facet(pitch, axis, tilt, azimuth, phase):
-    """The plane of a patch: indices of its columns, heights in voxels, the unit normal."""
-    others = [a for a in range(3) if a != axis]
-    normal = np.zeros(3)
+def tilted(axis, tilt, azimuth):
+    """The unit normal `tilt` degrees off an axis."""
+    normal = np.empty(3)
     normal[axis] = np.cos(np.radians(tilt))
-    normal[others[0]] = np.sin(np.radians(tilt)) * np.cos(azimuth)
-    normal[others[1]] = np.sin(np.radians(tilt)) * np.sin(azimuth)
-    counts = [int(EDGE_MM / pitch[a]) for a in others]
-    u, v = np.meshgrid(*map(np.arange, counts), indexing="ij")
+    normal[(axis + 1) % 3] = np.sin(np.radians(tilt)) * np.cos(azimuth)
+    normal[(axis + 2) % 3] = np.sin(np.radians(tilt)) * np.sin(azimuth)
+    return normal
+
+
+def facet(pitch, axis, normal, phase):
+    """The plane of a patch: the axes and indices of its columns, their heights in voxels."""
+    others = [a for a in range(3) if a != axis]
+    u, v = np.meshgrid(*(np.arange(int(EDGE_MM / pitch[a])) for a in others), indexing="ij")
     slopes = [-normal[a] * pitch[a] / (normal[axis] * pitch[axis]) for a in others]
-    return others, u, v, phase + slopes[0] * u + slopes[1] * v, normal
+    return others, u, v, phase + slopes[0] * u + slopes[1] * v
 
 
 def residual_mm(mask, pitch, axis, others, u, v, height, normal, amplitude, shift):
     """The printed height less the plane's, along the normal."""
     k_d = 0.5 / np.max(np.abs(normal) / pitch)
     base = np.round(height).astype(int)
-    reach = 2 + int(np.ceil(amplitude / 2 * k_d / (normal[axis] * pitch[axis])))
+    reach = 2 + int(np.ceil(amplitude / 2 * k_d / (abs(normal[axis]) * pitch[axis])))
     printed = np.full(height.shape, -reach - 0.5)
     for offset in range(-reach, reach + 1):
         d = (base + offset - height) * pitch[axis] * normal[axis]
@@ -72,25 +76,33 @@ def rms_um(residual, pitch, axis, others, normal, spread):
     return 1e3 * float(np.sqrt(np.mean(blurred[tuple(inner)] ** 2)))
 
 
+def facets(pitch):
+    """(name, axis of the columns, unit normal, phase, where the tile begins), the same in every run."""
+    draw = np.random.default_rng(1)
+    for tilt in TILTS:
+        for axis in range(3):
+            for _ in range(POSITIONS):
+                normal = tilted(axis, tilt, draw.uniform(0, 2 * np.pi))
+                yield f"tilt {tilt}", axis, normal, draw.uniform(0, 1), draw.integers(0, 2**16, 3)
+    for _ in range(12 * POSITIONS):
+        normal = draw.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        axis = int(np.argmax(np.abs(normal) * pitch))
+        yield "sphere", axis, normal * np.sign(normal[axis]), draw.uniform(0, 1), draw.integers(0, 2**16, 3)
+
+
 def measured(mask):
     result = {}
     for lattice, pitch in LATTICES_MM.items():
         pitch = np.array(pitch)
         for amplitude in AMPLITUDES:
-            draw = np.random.default_rng(1)
-            for tilt in TILTS:
-                found = {spread: [] for spread in SPREADS_MM}
-                for axis in range(3):
-                    for _ in range(POSITIONS):
-                        azimuth, phase = draw.uniform(0, 2 * np.pi), draw.uniform(0, 1)
-                        plane = facet(pitch, axis, tilt, azimuth, phase)
-                        shift = draw.integers(0, 2**16, 3)
-                        residual = residual_mm(mask, pitch, axis, *plane, amplitude, shift)
-                        for spread in SPREADS_MM:
-                            found[spread].append(rms_um(residual, pitch, axis, plane[0], plane[4], spread))
-                for spread, values in found.items():
-                    key = f"{lattice} amplitude {amplitude} spread {round(spread * 1e3)} tilt {tilt}"
-                    result[key] = [round(value, 4) for value in values]
+            for name, axis, normal, phase, shift in facets(pitch):
+                others, u, v, height = facet(pitch, axis, normal, phase)
+                residual = residual_mm(mask, pitch, axis, others, u, v, height, normal, amplitude, shift)
+                for spread in SPREADS_MM:
+                    key = f"{lattice} amplitude {amplitude} spread {round(spread * 1e3)} {name}"
+                    value = rms_um(residual, pitch, axis, others, normal, spread)
+                    result.setdefault(key, []).append(round(value, 4))
     return result
 
 

@@ -32,8 +32,8 @@ class Masks(ProgramTest):
         return sorted(self.cache.iterdir()) if self.cache.exists() else []
 
     def test_a_made_mask_is_the_one_that_mask_makes(self):
-        self.succeed("mask", "--size", 16, "--sigma", 0.8, "--seed", 3, "-o", "mask.vdb")
-        self.dithered("--size", 16, "--sigma", 0.8, "--seed", 3, "-o", "made.vdb")
+        self.succeed("mask", "--kernel", "axis-mix", "--size", 16, "--sigma", 1.2, "--seed", 3, "-o", "mask.vdb")
+        self.dithered("--size", 16, "--sigma", 1.2, "--seed", 3, "-o", "made.vdb")
         self.dithered("--mask", "mask.vdb", "-o", "given.vdb")
         self.succeed("compare", "made.vdb", "given.vdb")
 
@@ -55,6 +55,12 @@ class Masks(ProgramTest):
     def test_the_installed_mask_needs_no_cache(self):
         self.dithered("--mask", "blue")
         self.assertEqual(self.kept(), [])
+
+    def test_the_installed_mask_is_the_one_that_would_be_made(self):
+        self.dithered("-o", "installed.vdb")
+        self.dithered("--size", 64, "-o", "made.vdb")
+        self.assertEqual(len(self.kept()), 1)
+        self.succeed("compare", "installed.vdb", "made.vdb")
 
     def test_the_mask_of_the_paper_takes_another_size(self):
         self.dithered("--mask", "paper", "--size", 16, "-o", "made.vdb")
