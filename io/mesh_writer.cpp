@@ -29,7 +29,7 @@ static_assert(std::endian::native == std::endian::little, "mesh files are little
 /// A file that is written from its beginning to its end through a buffer.
 class Output {
  public:
-  Output(fs::path path, fs::path shown, int flags)
+  Output(const fs::path& path, fs::path shown, int flags)
       : shown_(std::move(shown)), file_(::open(path.c_str(), O_RDWR | O_CLOEXEC | flags, 0666)) {
     if (file_ < 0) fail();
     buffer_.reserve(buffer_bytes);

@@ -29,7 +29,7 @@ class ProfileParser {
     known(json, {"name", "title", "source", "pitch_mm", "build_mm", "point_spread_mm", "materials"},
           "");
     profile_.name = this->text(json, "name", "");
-    if (profile_.name.empty()) problems_.emplace_back("there is no name");
+    if (!json.contains("name")) problems_.emplace_back("there is no name");
     profile_.title = json.contains("title") ? this->text(json, "title", "") : profile_.name;
     profile_.source = json.contains("source") ? this->text(json, "source", "") : "";
     profile_.pitch_mm = lengths(json, "pitch_mm", 1e-4, 100);

@@ -40,8 +40,7 @@ class Interlace : public Filter {
       }
       out.leaves_per_row /= 2;
       out.grids.clear();
-      plain_ = std::make_shared<openvdb::math::Transform>(
-          std::make_shared<openvdb::math::ScaleMap>(out.lattice.pitch_mm));
+      plain_ = transformOf(out.lattice);
     } else {
       plain_ = surface->transform().copy();
     }

@@ -206,6 +206,7 @@ class Measure : public Sink {
     const auto warn = [this](const std::string& text) { report().warn(text); };
     if (standsAlone()) {
       mesh_ = readMesh(file_, warn);
+      if (smooth_ != "none") checkClosed();
     } else {
       take(surface_->finish());
     }
@@ -247,6 +248,17 @@ class Measure : public Sink {
           "cancel");
     for (const std::string& line : repairs.lines()) report().warn("--reference: " + line);
     reference_.emplace(std::move(mesh));
+  }
+
+  /// What smoothing makes of borders is nothing to measure.
+  void checkClosed() const {
+    MeshRepairs repairs;
+    repaired(mesh_, repairs);
+    const std::vector<std::string> lines = repairs.lines();
+    if (!lines.empty()) {
+      throw DataError("--smooth: '" + file_ + "' is no closed mesh (" + lines.front() +
+                      "); measure it as it is, or repair it first");
+    }
   }
 
   void take(const SurfacePiece& piece) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "io/mesh_reader.h"
 #include "io/printer_profile.h"
@@ -62,17 +63,17 @@ class MeshToSdf : public Source {
     Schema schema;
     const Vec3d pitch_mm = pitchMm(schema);
     band_ = bandFrom(band_text_);
-    auto mesh = std::make_shared<Mesh>(readMeshes());
-    place(*mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
-    questionSize(*mesh);
-    schema.lattice = latticeAround(*mesh, pitch_mm);
+    Mesh mesh = readMeshes();
+    place(mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
+    questionSize(mesh);
+    schema.lattice = latticeAround(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
-    planParts(*mesh, lattice);
-    repair(*mesh);
-    const std::vector<double> leaves = leavesOfRows(*mesh, lattice);
+    planParts(mesh, lattice);
+    const SwallowedWalls walls = repair(mesh);
+    const std::vector<double> leaves = leavesOfRows(mesh, lattice);
     schema.leaves_per_row = *std::max_element(leaves.begin(), leaves.end());
     schema.leaves = std::accumulate(leaves.begin(), leaves.end(), 0.0);
-    field_ = std::make_unique<MeshDistance>(std::move(mesh), lattice, band_, extras_);
+    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, walls);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
@@ -124,7 +125,8 @@ class MeshToSdf : public Source {
     return diameters ? Band{size, 0} : Band{0, size};
   }
 
-  void repair(Mesh& mesh) const {
+  /// Makes the mesh bound a solid and finds what of it is no surface of that.
+  SwallowedWalls repair(Mesh& mesh) const {
     MeshRepairs repairs;
     mesh = repaired(std::move(mesh), repairs);
     if (mesh.triangles.empty())
@@ -134,6 +136,9 @@ class MeshToSdf : public Source {
       throw DataError("the triangles enclose nothing: " + std::to_string(repairs.boundary_edges) +
                       " of their " + std::to_string(sides) +
                       " sides meet no other; join them in a mesh editor first");
+    SwallowedWalls walls = swallowedWalls(mesh);
+    repairs.swallowed_triangles = walls.swallowed;
+    repairs.cut_triangles = walls.cut;
     const std::vector<std::string> lines = repairs.lines();
     if (strict_ && !lines.empty())
       throw DataError("the mesh needs repair, which --strict forbids: " + lines.front() +
@@ -146,6 +151,9 @@ class MeshToSdf : public Source {
     report().count("turned_parts", static_cast<double>(repairs.turned_parts));
     report().count("boundary_edges", static_cast<double>(repairs.boundary_edges));
     report().count("closed_holes", static_cast<double>(repairs.closed_holes));
+    report().count("swallowed_triangles", static_cast<double>(repairs.swallowed_triangles));
+    report().count("cut_triangles", static_cast<double>(repairs.cut_triangles));
+    return walls;
   }
 
   Mesh readMeshes() {
@@ -166,16 +174,17 @@ class MeshToSdf : public Source {
       const auto begin = all.triangles.begin() + static_cast<std::ptrdiff_t>(first);
       part.triangles.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
       MeshRepairs repairs;
-      parts_.emplace_back(std::make_shared<Mesh>(repaired(std::move(part), repairs)), lattice,
-                          band_);
+      part = repaired(std::move(part), repairs);
+      parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
       first += count;
     }
   }
 
   /// Warns of a part that is hardly meant to be as large or as small as it is.
   void questionSize(const Mesh& mesh) const {
-    constexpr double largest_mm = 3000;
-    constexpr double least_mm = 0.1;
+    // 3 m and 0.1 mm, as far as floats of a file tell.
+    constexpr double largest_mm = 3000 * (1 - 1e-6);
+    constexpr double least_mm = 0.1 * (1 + 1e-6);
     const MeshBounds bounds = boundsOf(mesh);
     const Vec3d size_mm = bounds.max - bounds.min;
     const double longest_mm = std::max({size_mm.x(), size_mm.y(), size_mm.z()});

@@ -71,7 +71,7 @@ class SliceExport : public Sink {
                  "Mirror top to bottom. By default a slice is seen from above: the top row has the "
                  "greatest y");
     options.text("background", background_, "COLOUR",
-                 "Colour of what is not printed, in png: #rrggbb, or r,g,b,a of 0 to 255");
+                 "Colour of what is not printed, in png and tiff: #rrggbb, or r,g,b,a of 0 to 255");
     options.choice(
         "exr-packing", exr_packing_, {"none", "rle", "zips", "zip", "piz"},
         "How exr is packed, always without loss: zips and rle by rows, zip by 16 and piz "

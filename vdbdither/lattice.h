@@ -1,6 +1,15 @@
 #pragma once
 
+#include <memory>
+
 #include <openvdb/Types.h>
+
+namespace openvdb {
+OPENVDB_USE_VERSION_NAMESPACE
+namespace OPENVDB_VERSION_NAME::math {
+class Transform;
+}
+}  // namespace openvdb
 
 namespace vdbdither {
 
@@ -41,5 +50,9 @@ struct Lattice {
   [[nodiscard]] double diagonalMm() const { return pitch_mm.length(); }
   friend bool operator==(const Lattice&, const Lattice&) = default;
 };
+
+/// The transform of a grid on the lattice, one of its own: a pure scale, and a shift where the
+/// origin is not zero.
+std::shared_ptr<openvdb::math::Transform> transformOf(const Lattice& lattice);
 
 }  // namespace vdbdither

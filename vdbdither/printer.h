@@ -17,14 +17,15 @@ struct Material {
 
 /// What must be known of a printer before anything is voxelized for it.
 struct PrinterProfile {
-  std::string name;         ///< as written after --printer: mimaki-3duj-553
-  std::string title;        ///< as people call it
-  std::string source;       ///< where these figures were taken from
-  openvdb::Vec3d pitch_mm;  ///< voxel size across the carriage (x), along it (y), and the layer (z)
-  openvdb::Vec3d build_mm{0, 0, 0};  ///< usable volume; zero where unknown
+  std::string name;    ///< as written after --printer: mimaki-3duj-553
+  std::string title;   ///< as people call it
+  std::string source;  ///< where these figures were taken from
+  /// Voxel size across the carriage (x), along it (y), and the layer (z).
+  openvdb::Vec3d pitch_mm{0.0};
+  openvdb::Vec3d build_mm{0.0};  ///< usable volume; zero where unknown
   /// How far a droplet spreads: standard deviation of a Gaussian along each axis; zero where
   /// unknown.
-  openvdb::Vec3d point_spread_mm{0, 0, 0};
+  openvdb::Vec3d point_spread_mm{0.0};
   std::vector<Material>
       materials;  ///< model materials first to last; support is the printer's own affair
 };

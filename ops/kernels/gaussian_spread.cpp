@@ -36,6 +36,7 @@ std::vector<float> weightsAlong(double pitch_mm, double sigma_mm) {
     sum += shares.back();
   }
   std::vector<float> weights;
+  weights.reserve(shares.size());
   for (const double share : shares) weights.push_back(static_cast<float>(share / sum));
   return weights;
 }
@@ -243,7 +244,7 @@ Coord GaussianSpread::reach() const {
 
 FloatGrid::Ptr GaussianSpread::run(const openvdb::BoolGrid& solid, const CoordBBox& box,
                                    ZRange core, ZRange valid) const {
-  const auto printed = makePrintedGrid(solid.transform());
+  auto printed = makePrintedGrid(solid.transform());
   if (box.empty() || core.empty() || solid.empty()) return printed;
   const Occupancy occupancy(solid, box, valid);
   const CoordBBox within(Coord(box.min().x(), box.min().y(), core.begin),

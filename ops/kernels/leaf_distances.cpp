@@ -1,203 +1,354 @@
 // One source is compiled for the baseline and for AVX2. Without contraction both round every
 // operation alike.
+//
+// A region is convex: along z it is one interval. The intervals of four columns are found at once;
+// within them the distance takes no further test.
 
 #include "ops/kernels/leaf_distances.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "ops/kernels/row_crossings.h"
 
 namespace vdbdither {
 
 namespace {
 
-constexpr int edge = 8;
+constexpr int edge = leaf_layers;
+constexpr std::size_t leaves_per_page = 32;
 
-// Vectors that fit one register; they alias the arrays that they are laid over.
-struct Portable {
-  using Lanes = double __attribute__((vector_size(16), may_alias));
-  using Flags = std::int64_t __attribute__((vector_size(16), may_alias));
-  static constexpr Lanes ramp{0, 1};
+// The baseline takes two registers for one of these. They alias the arrays that they are laid over.
+using Doubles = double __attribute__((vector_size(32), may_alias));
+using Floats = float __attribute__((vector_size(16), may_alias));
+using Integers = std::int32_t __attribute__((vector_size(16), may_alias));
+using Halves = std::int64_t __attribute__((vector_size(16), may_alias));
+
+constexpr int lanes = 4;
+constexpr Doubles ramp{0, 1, 2, 3};
+constexpr Integers integer_ramp{0, 1, 2, 3};
+
+/// A bound solved for one axis: the axis' offset is at least or at most that of the plane.
+struct Limit {
+  double x, y, constant;
 };
-struct Avx2 {
-  using Lanes = double __attribute__((vector_size(32), may_alias));
-  using Flags = std::int64_t __attribute__((vector_size(32), may_alias));
-  static constexpr Lanes ramp{0, 1, 2, 3};
-};
 
-/// `rank` and `fixed_count` at compile time let the forms stay in registers; a count of zero stands
-/// for any.
-template <class Set, int rank, int fixed_count, bool track>
-[[gnu::always_inline]] inline void lowerBy(const LatticeFeature& feature,
-                                           const openvdb::Coord& origin, std::int64_t name,
-                                           LeafDistances& leaf) {
-  using Lanes = typename Set::Lanes;
-  using Flags = typename Set::Flags;
-  constexpr int width = sizeof(Lanes) / sizeof(double);
-  constexpr int parts = edge / width;
-  constexpr int capacity = fixed_count > 0 ? fixed_count : 3 + MeshFeature::max_bounds;
-  const int count = fixed_count > 0 ? fixed_count : feature.count;
+/// An end of an interval that holds nothing.
+constexpr double nowhere = -1e9;
 
-  const int i_begin = std::max(feature.reach.min().x() - origin.x(), 0);
-  const int i_end = std::min(feature.reach.max().x() - origin.x() + 1, edge);
-  const int j_begin = std::max(feature.reach.min().y() - origin.y(), 0);
-  const int j_end = std::min(feature.reach.max().y() - origin.y() + 1, edge);
-  // Whole vectors of the widest set, so that every set visits the same voxels.
-  const int k_begin = std::max(feature.reach.min().z() - origin.z(), 0) & ~3;
-  const int k_end = (std::min(feature.reach.max().z() - origin.z() + 1, edge) + 3) & ~3;
-
-  double x[capacity], y[capacity], constant[capacity];
-  double inverse_y[capacity], most[capacity], least[capacity];  // of a bound along its column
-  Lanes rise[capacity][parts];
-  for (int f = 0; f < count; ++f) {
-    const LinearForm& form = feature.forms[f];
-    x[f] = form.gradient.x();
-    y[f] = form.gradient.y();
-    constant[f] = form.at(origin.asVec3d());
-    for (int part = 0; part < parts; ++part)
-      rise[f][part] = (Set::ramp + static_cast<double>(part * width)) * form.gradient.z();
-    inverse_y[f] = 1 / y[f];
-    const double first = form.gradient.z() * k_begin;
-    const double last = form.gradient.z() * (k_end - 1);
-    least[f] = std::min(first, last);
-    most[f] = std::max(first, last);
+/// Narrows [low, high], offsets along one axis, to where `best + slope · offset` can reach zero,
+/// and a little more than rounding may take from that.
+[[gnu::always_inline]] inline void narrow(const LatticeForm& form, double best, double slope,
+                                          double& low, double& high) {
+  best += 1e-9 * (std::abs(form.x) + std::abs(form.y) + std::abs(form.z));
+  if (slope > 0) {
+    low = std::max(low, -best / slope);
+  } else if (slope < 0) {
+    high = std::min(high, -best / slope);
+  } else if (best < 0) {
+    high = nowhere;
   }
-  for (int i = i_begin; i < i_end; ++i) {
-    double row[capacity];
-    double j_low = j_begin;
-    double j_high = j_end - 1;
-    for (int f = 0; f < count; ++f) row[f] = constant[f] + x[f] * i;
-    // Columns that cannot be within the band of the plane or line, or that miss a bound, are left
-    // out.
-    const auto keep = [&](double best, double slope, double inverse_slope)
-        __attribute__((always_inline)) {
-      const double zero = -best * inverse_slope;
-      if (slope > 0) {
-        j_low = std::max(j_low, zero);
-      } else if (slope < 0) {
-        j_high = std::min(j_high, zero);
-      } else if (best < 0) {
-        j_high = -1;
-      }
-    };
-    for (int f = 0; f < rank && rank < 3; ++f) {
-      keep(feature.band_mm + row[f] + most[f], y[f], inverse_y[f]);
-      keep(feature.band_mm - row[f] - least[f], -y[f], -inverse_y[f]);
+}
+
+template <int rank, bool track>
+[[gnu::always_inline]] inline void lowerBy(const LatticeRegion& region, std::uint32_t name,
+                                           LeafDistances& leaves) {
+  const openvdb::Coord& base = region.base;
+  const openvdb::Coord first = region.reach.min() - base;
+  const openvdb::Coord last = region.reach.max() - base;
+  // Regions of a few planes are not worth a narrower look.
+  constexpr int few = 8;
+
+  const double k_first = first.z();
+  const double k_last = last.z();
+  std::array<Limit, LatticeRegion::max_bounds> floors, ceilings, walls;
+  std::size_t floor_count = 0;
+  std::size_t ceiling_count = 0;
+  std::size_t wall_count = 0;
+  for (int b = 0; b < region.bounds; ++b) {
+    const LatticeForm& form = region.bound[static_cast<std::size_t>(b)];
+    constexpr double level = 1e-100;
+    if (std::abs(form.z) < level) {
+      walls[wall_count++] = {form.x, form.y, form.constant};
+      continue;
     }
-    for (int f = rank; f < count; ++f) keep(row[f] + most[f], y[f], inverse_y[f]);
-    if (!(j_low <= j_high)) continue;
-    const int j_last = static_cast<int>(j_high);
-    for (int j = static_cast<int>(std::ceil(j_low)); j <= j_last; ++j) {
-      double column[capacity];
-      for (int f = 0; f < count; ++f) column[f] = row[f] + y[f] * j;
-      for (int part = k_begin / width; part * width < k_end; ++part) {
-        Lanes squared{};
-        for (int f = 0; f < rank; ++f) {
-          const Lanes form = rise[f][part] + column[f];
-          squared += form * form;
+    const double inverse = -1 / form.z;
+    const Limit limit{form.x * inverse, form.y * inverse, form.constant * inverse};
+    if (form.z > 0) {
+      floors[floor_count++] = limit;
+    } else {
+      ceilings[ceiling_count++] = limit;
+    }
+  }
+
+  double i_low = first.x();
+  double i_high = last.x();
+  if (last.x() - first.x() >= few) {
+    for (int b = 0; b < region.bounds; ++b) {
+      const LatticeForm& form = region.bound[static_cast<std::size_t>(b)];
+      narrow(form,
+             form.constant + std::max(form.y * first.y(), form.y * last.y()) +
+                 std::max(form.z * k_first, form.z * k_last),
+             form.x, i_low, i_high);
+    }
+    if (!(i_low <= i_high)) return;
+  }
+  const Doubles rise_of_first = ramp * region.distance[0].z;
+  const Doubles rise_of_second = ramp * region.distance[1].z;
+
+  for (int i = roundedUp(i_low); i <= roundedDown(i_high); ++i) {
+    double j_low = first.y();
+    double j_high = last.y();
+    if (last.y() - first.y() >= few) {
+      for (int b = 0; b < region.bounds; ++b) {
+        const LatticeForm& form = region.bound[static_cast<std::size_t>(b)];
+        narrow(form, form.constant + form.x * i + std::max(form.z * k_first, form.z * k_last),
+               form.y, j_low, j_high);
+      }
+      if (!(j_low <= j_high)) continue;
+    }
+    const int j_end = roundedDown(j_high) + 1;
+    std::array<double, LatticeRegion::max_bounds> floor_rows, ceiling_rows;
+    for (std::size_t f = 0; f < floor_count; ++f)
+      floor_rows[f] = floors[f].constant + floors[f].x * i;
+    for (std::size_t c = 0; c < ceiling_count; ++c)
+      ceiling_rows[c] = ceilings[c].constant + ceilings[c].x * i;
+    const auto leaf_x = static_cast<std::size_t>(((base.x() + i) >> 3) - leaves.leaves().min().x());
+    for (int j = roundedUp(j_low); j < j_end; j += lanes) {
+      const Doubles columns = ramp + static_cast<double>(j);
+      Doubles low = Doubles{} + k_first;
+      Doubles high = Doubles{} + k_last;
+      for (std::size_t f = 0; f < floor_count; ++f) {
+        const Doubles at = columns * floors[f].y + floor_rows[f];
+        low = at > low ? at : low;
+      }
+      for (std::size_t c = 0; c < ceiling_count; ++c) {
+        const Doubles at = columns * ceilings[c].y + ceiling_rows[c];
+        high = at < high ? at : high;
+      }
+      for (std::size_t w = 0; w < wall_count; ++w) {
+        const Doubles at = columns * walls[w].y + (walls[w].constant + walls[w].x * i);
+        high = at < 0 ? Doubles{} + nowhere : high;
+      }
+      high = columns < static_cast<double>(j_end) ? high : Doubles{} + nowhere;
+      low = low < k_last + 1 ? low : Doubles{} + (k_last + 1);
+      high = high > nowhere ? high : Doubles{} + nowhere;
+      // Conversion cuts off fractions, of positive and of negative numbers.
+      Doubles begin = __builtin_convertvector(__builtin_convertvector(low, Integers), Doubles);
+      begin = begin < low ? begin + 1 : begin;
+      Doubles end = __builtin_convertvector(__builtin_convertvector(high, Integers), Doubles);
+      end = end > high ? end - 1 : end;
+      const Integers begins = __builtin_convertvector(begin, Integers);
+      const Integers ends = __builtin_convertvector(end, Integers);
+      const Integers some = begins <= ends;
+      const auto& halves = reinterpret_cast<const Halves&>(some);
+      if ((halves[0] | halves[1]) == 0) continue;
+
+      for (int lane = 0; lane < lanes; ++lane) {
+        const int k_begin = begins[lane];
+        const int k_end = ends[lane];
+        if (k_end < k_begin) continue;
+        const int y = base.y() + j + lane;
+        std::array<double, rank> column;
+        for (std::size_t f = 0; f < rank; ++f) {
+          const LatticeForm& form = region.distance[f];
+          column[f] = form.constant + form.x * i + form.y * (j + lane);
         }
-        const int offset = (i * edge + j) * edge + part * width;
-        auto& best = *reinterpret_cast<Lanes*>(leaf.squared + offset);
-        Flags take = squared < best;
-        for (int f = rank; f < count; ++f) take &= (rise[f][part] + column[f]) >= 0;
-        best = take ? squared : best;
-        if constexpr (track) {
-          auto& nearest = *reinterpret_cast<Flags*>(leaf.nearest + offset);
-          nearest = take ? Flags{} + name : nearest;
+        const std::size_t slot =
+            (leaf_x * leaves.stride()) +
+            static_cast<std::size_t>((y >> 3) - leaves.leaves().min().y()) * LeafDistances::depth;
+        const int leaf_base = (base.z() >> 3) - leaves.leaves().min().z();
+        const int row = ((base.x() + i) & 7) * edge * edge + (y & 7) * edge;
+        for (int k = k_begin & ~(lanes - 1); k <= k_end; k += lanes) {
+          Floats distance;
+          if constexpr (rank == 1) {
+            const Doubles form = rise_of_first + (column[0] + region.distance[0].z * k);
+            distance = __builtin_convertvector(form, Floats);
+            reinterpret_cast<Integers&>(distance) &= 0x7fffffff;
+          } else {
+            const Doubles one = rise_of_first + (column[0] + region.distance[0].z * k);
+            const Doubles two = rise_of_second + (column[1] + region.distance[1].z * k);
+            Doubles squared = one * one + two * two;
+            if constexpr (rank == 3) {
+              const Doubles three =
+                  ramp * region.distance[2].z + (column[2] + region.distance[2].z * k);
+              squared += three * three;
+            }
+            for (int l = 0; l < lanes; ++l) squared[l] = std::sqrt(squared[l]);
+            distance = __builtin_convertvector(squared, Floats);
+          }
+          const std::size_t at = slot + static_cast<std::size_t>(leaf_base + (k >> 3));
+          float* leaf = leaves.distances(at);
+          if (leaf == nullptr) leaf = leaves.make(at);
+          const int offset = row + (k & 7);
+          auto& nearest = *reinterpret_cast<Floats*>(leaf + offset);
+          const Integers ks = integer_ramp + k;
+          const Integers take = (ks >= k_begin) & (ks <= k_end) & (distance < nearest);
+          nearest = take ? distance : nearest;
+          if constexpr (track) {
+            auto& names = *reinterpret_cast<Integers*>(leaves.names(at) + offset);
+            names = take ? Integers{} + static_cast<std::int32_t>(name) : names;
+          }
         }
       }
     }
   }
 }
 
-template <class Set, bool track>
-[[gnu::always_inline]] inline void lowerAny(const LatticeFeature& feature,
-                                            const openvdb::Coord& origin, std::int64_t name,
-                                            LeafDistances& leaf) {
-  if (feature.rank == 1) {
-    lowerBy<Set, 1, 4, track>(feature, origin, name, leaf);
-  } else if (feature.rank == 2 && feature.count == 6) {
-    lowerBy<Set, 2, 6, track>(feature, origin, name, leaf);
-  } else if (feature.rank == 2) {
-    lowerBy<Set, 2, 0, track>(feature, origin, name, leaf);
-  } else {
-    lowerBy<Set, 3, 0, track>(feature, origin, name, leaf);
+[[gnu::always_inline]] inline void lowerAny(const LatticeRegion& region, std::uint32_t name,
+                                            bool track, LeafDistances& leaves) {
+  switch (region.rank) {
+    case 1:
+      return track ? lowerBy<1, true>(region, name, leaves)
+                   : lowerBy<1, false>(region, name, leaves);
+    case 2:
+      return track ? lowerBy<2, true>(region, name, leaves)
+                   : lowerBy<2, false>(region, name, leaves);
+    default:
+      return track ? lowerBy<3, true>(region, name, leaves)
+                   : lowerBy<3, false>(region, name, leaves);
   }
 }
 
-template <class Set>
-[[gnu::always_inline]] inline LeafBits finishAll(const LeafDistances& leaf, const LeafBits& inside,
-                                                 const LeafBits& exists, double limit_mm,
+[[gnu::always_inline]] inline void raiseAll(const LatticeSheet& sheet, float value,
+                                            const LeafDistances& at, float* values) {
+  const openvdb::Coord first = sheet.leaves.min() - sheet.base;
+  const openvdb::Coord last = sheet.leaves.max() - sheet.base;
+  const int low = sheet.leaves.min().z() - at.leaves().min().z();
+  const int high = sheet.leaves.max().z() - at.leaves().min().z();
+  const int above = at.leaves().min().z() - sheet.base.z();  // of the box's lowest leaf
+  const Floats raised = Floats{} + value;
+  for (int x = first.x(); x <= last.x(); ++x) {
+    for (int y = first.y(); y <= last.y(); ++y) {
+      const double row = sheet.form.constant + sheet.form.x * x + sheet.form.y * y;
+      float* column =
+          values + at.slot({sheet.base.x() + x, sheet.base.y() + y, at.leaves().min().z()});
+      for (int z = low & ~(lanes - 1); z <= high; z += lanes) {
+        const Doubles form = (ramp + static_cast<double>(z + above)) * sheet.form.z + row;
+        const Floats off = __builtin_convertvector(form, Floats);
+        const auto limit = static_cast<float>(sheet.limit);
+        const Integers zs = integer_ramp + z;
+        auto& present = *reinterpret_cast<Floats*>(column + z);
+        const Integers take =
+            (zs >= low) & (zs <= high) & (off <= limit) & (off >= -limit) & (present < raised);
+        present = take ? raised : present;
+      }
+    }
+  }
+}
+
+/// The sign bits of four voxels, by the bits of those that are inside.
+constexpr std::array<std::array<std::int32_t, lanes>, 16> signs = [] {
+  std::array<std::array<std::int32_t, lanes>, 16> made{};
+  for (unsigned bits = 0; bits < 16; ++bits)
+    for (unsigned lane = 0; lane < lanes; ++lane)
+      if (bits >> lane & 1) made[bits][lane] = std::numeric_limits<std::int32_t>::min();
+  return made;
+}();
+
+[[gnu::always_inline]] inline LeafBits finishAll(const float* distances, const LeafBits& inside,
+                                                 const LeafBits& exists, float limit_mm,
                                                  float background_mm, float* values) {
-  using Lanes = typename Set::Lanes;
-  using Flags = typename Set::Flags;
-  constexpr int width = sizeof(Lanes) / sizeof(double);
-  Flags bit;
-  for (int lane = 0; lane < width; ++lane) bit[lane] = std::int64_t{1} << lane;
-  alignas(64) double roots[LeafDistances::voxels];
-  for (int v = 0; v < LeafDistances::voxels; ++v) roots[v] = std::sqrt(leaf.squared[v]);
-
+  const Floats background = Floats{} + background_mm;
   LeafBits active;
-  const Lanes background = Lanes{} + double{background_mm};
   for (std::size_t plane = 0; plane < edge; ++plane) {
     std::uint64_t found = 0;
-    for (int v = 0; v < 64; v += width) {
-      const int offset = static_cast<int>(plane) * 64 + v;
-      const auto& root = *reinterpret_cast<const Lanes*>(roots + offset);
-      const auto existing = Flags{} + static_cast<std::int64_t>(exists[plane] >> v);
-      const auto within = Flags{} + static_cast<std::int64_t>(inside[plane] >> v);
-      const Flags on = (root < limit_mm) & ((existing & bit) != 0);
-      const Lanes magnitude = on ? root : background;
-      const Lanes value = (within & bit) != 0 ? Lanes{} - magnitude : magnitude;
-      const Flags marks = on & bit;
-      std::int64_t mark = 0;
-      for (int lane = 0; lane < width; ++lane) {
-        mark |= marks[lane];
-        values[offset + lane] = static_cast<float>(value[lane]);
-      }
-      found |= static_cast<std::uint64_t>(mark) << v;
+    for (int v = 0; v < edge * edge; v += lanes) {
+      const int offset = static_cast<int>(plane) * edge * edge + v;
+      const auto& distance = *reinterpret_cast<const Floats*>(distances + offset);
+      Integers on = distance < limit_mm;
+      if (exists[plane] != ~0ULL)
+        for (int lane = 0; lane < lanes; ++lane)
+          if (!(exists[plane] >> (v + lane) & 1)) on[lane] = 0;
+      Floats value = on ? distance : background;
+      reinterpret_cast<Integers&>(value) |=
+          reinterpret_cast<const Integers&>(signs[inside[plane] >> v & 15]);
+      *reinterpret_cast<Floats*>(values + offset) = value + 0.0F;  // no negative zero
+#ifdef __SSE2__
+      const auto marks =
+          static_cast<unsigned>(_mm_movemask_ps(reinterpret_cast<const __m128&>(on)));
+#else
+      const Integers set = on & Integers{1, 2, 4, 8};
+      const auto marks = static_cast<unsigned>(set[0] | set[1] | set[2] | set[3]);
+#endif
+      found |= std::uint64_t{marks} << v;
     }
     active[plane] = found;
   }
   return active;
 }
 
-void lowerPortable(const LatticeFeature& feature, const openvdb::Coord& origin, std::int64_t name,
-                   bool track, LeafDistances& leaf) {
-  track ? lowerAny<Portable, true>(feature, origin, name, leaf)
-        : lowerAny<Portable, false>(feature, origin, name, leaf);
+void lowerPortable(const LatticeRegion& region, std::uint32_t name, bool track,
+                   LeafDistances& leaves) {
+  lowerAny(region, name, track, leaves);
 }
-
-LeafBits finishPortable(const LeafDistances& leaf, const LeafBits& inside, const LeafBits& exists,
-                        double limit_mm, float background_mm, float* values) {
-  return finishAll<Portable>(leaf, inside, exists, limit_mm, background_mm, values);
+void raisePortable(const LatticeSheet& sheet, float value, const LeafDistances& at, float* values) {
+  raiseAll(sheet, value, at, values);
+}
+LeafBits finishPortable(const float* distances, const LeafBits& inside, const LeafBits& exists,
+                        float limit_mm, float background_mm, float* values) {
+  return finishAll(distances, inside, exists, limit_mm, background_mm, values);
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) void lowerAvx2(const LatticeFeature& feature,
-                                               const openvdb::Coord& origin, std::int64_t name,
-                                               bool track, LeafDistances& leaf) {
-  track ? lowerAny<Avx2, true>(feature, origin, name, leaf)
-        : lowerAny<Avx2, false>(feature, origin, name, leaf);
+__attribute__((target("avx2"))) void lowerAvx2(const LatticeRegion& region, std::uint32_t name,
+                                               bool track, LeafDistances& leaves) {
+  lowerAny(region, name, track, leaves);
 }
-
-__attribute__((target("avx2"))) LeafBits finishAvx2(const LeafDistances& leaf,
-                                                    const LeafBits& inside, const LeafBits& exists,
-                                                    double limit_mm, float background_mm,
-                                                    float* values) {
-  return finishAll<Avx2>(leaf, inside, exists, limit_mm, background_mm, values);
+__attribute__((target("avx2"))) void raiseAvx2(const LatticeSheet& sheet, float value,
+                                               const LeafDistances& at, float* values) {
+  raiseAll(sheet, value, at, values);
+}
+__attribute__((target("avx2"))) LeafBits finishAvx2(const float* distances, const LeafBits& inside,
+                                                    const LeafBits& exists, float limit_mm,
+                                                    float background_mm, float* values) {
+  return finishAll(distances, inside, exists, limit_mm, background_mm, values);
 }
 #endif
 
 }  // namespace
 
+template <class Value>
+Value* LeafDistances::Pool<Value>::take() {
+  const std::size_t page = used / leaves_per_page;
+  if (page == pages.size()) pages.emplace_back(new Value[leaves_per_page * voxels]);
+  return pages[page].get() + used++ % leaves_per_page * voxels;
+}
+
+void LeafDistances::begin(const openvdb::CoordBBox& leaves, bool track) {
+  leaves_ = leaves;
+  rows_ = static_cast<std::size_t>(leaves.dim().y());
+  track_ = track;
+  const std::size_t count = static_cast<std::size_t>(leaves.dim().x()) * rows_ * depth;
+  occupied_.assign(static_cast<std::size_t>(leaves.dim().x()), 0);
+  distances_.assign(count, nullptr);
+  names_.assign(track ? count : 0, nullptr);
+  last_note_.assign(count, none);
+  notes_.clear();
+  distance_pool_.used = 0;
+  name_pool_.used = 0;
+}
+
+float* LeafDistances::make(std::size_t slot) {
+  occupy(slot);
+  distances_[slot] = distance_pool_.take();
+  std::fill_n(distances_[slot], voxels, std::numeric_limits<float>::infinity());
+  if (track_) {
+    names_[slot] = name_pool_.take();
+    std::fill_n(names_[slot], voxels, 0U);
+  }
+  return distances_[slot];
+}
+
 const LeafKernels& portableLeafKernels() {
-  static const LeafKernels kernels{&lowerPortable, &finishPortable};
+  static const LeafKernels kernels{&lowerPortable, &raisePortable, &finishPortable};
   return kernels;
 }
 
 const LeafKernels& leafKernels() {
 #if defined(__x86_64__)
-  static const LeafKernels avx2{&lowerAvx2, &finishAvx2};
+  static const LeafKernels avx2{&lowerAvx2, &raiseAvx2, &finishAvx2};
   if (__builtin_cpu_supports("avx2")) return avx2;
 #endif
   return portableLeafKernels();

@@ -1,12 +1,12 @@
-// The field is made leaf by leaf: every feature of the mesh is entered into the leaves that its
-// region touches, then each leaf takes the minimum over its features in a buffer that stays in the
-// cache. The sign comes from a sweep along x, which needs nothing but the triangles that cross the
-// layers at hand.
+// The layers are made in blocks of a few rows of leaves. Every feature of the mesh lowers the
+// distances of a block's voxels where its region holds them; the sign comes from a sweep along x,
+// which needs nothing but the triangles that cross the layers at hand.
 
 #include "ops/kernels/mesh_distance.h"
 
 #include <algorithm>
-#include <atomic>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -14,6 +14,7 @@
 #include <vector>
 
 #include <openvdb/tools/Prune.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/leaf_distances.h"
@@ -28,42 +29,32 @@ using openvdb::Vec3d;
 namespace {
 
 constexpr int edge = leaf_layers;
-constexpr std::size_t features_per_task = 512;
-
-/// A chunk with more features than this is split along y, which bounds what it holds of them.
-constexpr std::size_t features_per_chunk = 1 << 17;
+/// Rows of leaves of a block: so many that few triangles meet two blocks and that the leaves which
+/// a part's surface takes stay in the cache.
+constexpr int block_rows = LeafDistances::max_rows;
 
 /// Closer than this the direction to the nearest point says nothing about the normal.
 constexpr double on_surface_mm = 1e-6;
 
-/// The items of every leaf of a chunk, in the order in which they were entered.
-class LeafBins {
+/// The items of every bin, in the order in which they were entered.
+class Bins {
  public:
   struct Entry {
-    std::uint32_t leaf, item;
+    std::uint32_t bin, item;
   };
 
-  template <class Task>
-  LeafBins(std::size_t leaves, const std::vector<Task>& tasks, std::vector<Entry> Task::*entries)
-      : first_(leaves + 1, 0) {
-    for (const Task& task : tasks)
-      for (const Entry& entry : task.*entries) ++first_[entry.leaf + 1];
-    for (std::size_t leaf = 0; leaf < leaves; ++leaf) first_[leaf + 1] += first_[leaf];
-    items_.resize(first_.back());
-    for (const Task& task : tasks)
-      for (const Entry& entry : task.*entries) items_[first_[entry.leaf]++] = entry.item;
+  Bins() = default;
+  Bins(std::size_t bins, std::span<const Entry> entries) : first_(bins + 1, 0) {
+    for (const Entry& entry : entries) ++first_[entry.bin + 1];
+    for (std::size_t bin = 0; bin < bins; ++bin) first_[bin + 1] += first_[bin];
+    items_.resize(entries.size());
+    for (const Entry& entry : entries) items_[first_[entry.bin]++] = entry.item;
     std::copy_backward(first_.begin(), first_.end() - 1, first_.end());
     first_[0] = 0;
   }
-  LeafBins() = default;
 
-  /// How many items the leaves [begin, end) hold.
-  [[nodiscard]] std::size_t count(std::size_t begin, std::size_t end) const {
-    return first_[end] - first_[begin];
-  }
-
-  [[nodiscard]] std::span<const std::uint32_t> of(std::size_t leaf) const {
-    return {items_.data() + first_[leaf], first_[leaf + 1] - first_[leaf]};
+  [[nodiscard]] std::span<const std::uint32_t> of(std::size_t bin) const {
+    return {items_.data() + first_[bin], first_[bin + 1] - first_[bin]};
   }
 
  private:
@@ -82,15 +73,15 @@ class RowWinding {
   /// The inside of the last plane.
   [[nodiscard]] std::uint64_t bits() const { return bits_; }
 
-  /// The inside of the next leaf, whose crossings were packed.
-  LeafBits advance(std::span<const std::uint32_t> crossings) {
+  /// The inside of the next leaf, at `slot`, where crossings were noted.
+  LeafBits advance(const LeafDistances& noted, std::size_t slot) {
     LeafBits inside;
     inside.fill(bits_);
-    if (crossings.empty()) return inside;
+    if (!noted.noted(slot)) return inside;
     // Rows of a plane that enter and leave; the few that do so more than once wait in `again`.
     std::array<LeafBits, 2> once{};
     std::vector<std::uint32_t> again;
-    for (const std::uint32_t crossing : crossings) {
+    noted.visitNotes(slot, [&](std::uint32_t crossing) {
       const std::uint32_t plane = crossing >> 7;
       const std::uint64_t row = 1ULL << ((crossing >> 1) & 63);
       if (once[~crossing & 1][plane] & row) {
@@ -100,17 +91,19 @@ class RowWinding {
       } else {
         once[crossing & 1][plane] |= row;
       }
-    }
+    });
     for (std::size_t plane = 0; plane < edge; ++plane) {
-      lower(once[0][plane]);
-      raise(once[1][plane]);
-      for (const std::uint32_t crossing : again) {
-        if (crossing >> 7 != plane) continue;
-        const std::uint64_t row = 1ULL << ((crossing >> 1) & 63);
-        (crossing & 1) ? raise(row) : lower(row);
+      if ((once[0][plane] | once[1][plane]) != 0 || !again.empty()) {
+        lower(once[0][plane]);
+        raise(once[1][plane]);
+        for (const std::uint32_t crossing : again) {
+          if (crossing >> 7 != plane) continue;
+          const std::uint64_t row = 1ULL << ((crossing >> 1) & 63);
+          (crossing & 1) ? raise(row) : lower(row);
+        }
+        bits_ = 0;
+        for (const std::uint64_t digit : digits_) bits_ |= digit;
       }
-      bits_ = 0;
-      for (const std::uint64_t digit : digits_) bits_ |= digit;
       inside[plane] = bits_;
     }
     return inside;
@@ -135,14 +128,6 @@ class RowWinding {
   std::array<std::uint64_t, 16> digits_{};  ///< of the 64 numbers, in two's complement
   std::uint64_t bits_ = 0;                  ///< those that are not zero
 };
-
-openvdb::math::Transform::Ptr transformOf(const Lattice& lattice) {
-  using namespace openvdb::math;
-  if (lattice.origin_mm == Vec3d(0, 0, 0))
-    return std::make_shared<Transform>(std::make_shared<ScaleMap>(lattice.pitch_mm));
-  return std::make_shared<Transform>(
-      std::make_shared<ScaleTranslateMap>(lattice.pitch_mm, lattice.origin_mm));
-}
 
 template <class Tree>
 typename Tree::LeafNodeType* newLeaf(const Coord& origin, const typename Tree::ValueType& value) {
@@ -172,245 +157,207 @@ class TileWriter {
   Parent* parent_ = nullptr;
 };
 
-/// The bounds of a feature, and two caps for each distance form.
-constexpr std::size_t most_limits = MeshFeature::max_bounds + 6;
+Vec3d lowest(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+  return openvdb::math::minComponent(openvdb::math::minComponent(a, b), c);
+}
+Vec3d highest(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+  return openvdb::math::maxComponent(openvdb::math::maxComponent(a, b), c);
+}
 
-/// Calls visit(leaf) with the leaf coordinates of those leaves that overlap `reach` and meet every
-/// one of the half-spaces `limits` (functions of voxel indices) on their own; that is nearly those
-/// that meet all at once.
-template <class Visit>
-void visitLeaves(std::span<const LinearForm> limits, const CoordBBox& reach, const Visit& visit) {
-  const Coord first = reach.min() >> 3;
-  const Coord last = reach.max() >> 3;
-  const auto best = [](double slope, int leaf) {
-    return std::max(slope * (leaf * edge), slope * (leaf * edge + edge - 1));
-  };
-  std::array<double, most_limits> leaves_per_unit;
-  for (std::size_t l = 0; l < limits.size(); ++l)
-    leaves_per_unit[l] = -1 / (limits[l].gradient.x() * edge);
-  for (int z = first.z(); z <= last.z(); ++z) {
-    for (int y = first.y(); y <= last.y(); ++y) {
-      double x_low = first.x();
-      double x_high = last.x();
-      for (std::size_t l = 0; l < limits.size(); ++l) {
-        const Vec3d& g = limits[l].gradient;
-        const double rest = limits[l].constant + best(g.y(), y) + best(g.z(), z);
-        if (g.x() > 0) {
-          x_low = std::max(x_low, rest * leaves_per_unit[l] - (edge - 1.0) / edge);
-        } else if (g.x() < 0) {
-          x_high = std::min(x_high, rest * leaves_per_unit[l]);
-        } else if (rest < 0) {
-          x_high = -std::numeric_limits<double>::infinity();
-        }
-      }
-      if (!(x_low <= x_high)) continue;
-      const int end = static_cast<int>(std::floor(x_high));
-      for (int x = static_cast<int>(std::ceil(x_low)); x <= end; ++x) visit(Coord(x, y, z));
-    }
-  }
+Coord roundedDownAll(const Vec3d& p) {
+  return {roundedDown(p.x()), roundedDown(p.y()), roundedDown(p.z())};
+}
+
+LatticeForm onLattice(const LinearForm& form, const Vec3d& pitch_mm, const Vec3d& base_mm) {
+  return {form.gradient.x() * pitch_mm.x(), form.gradient.y() * pitch_mm.y(),
+          form.gradient.z() * pitch_mm.z(), form.at(base_mm)};
+}
+
+/// band_mm − sign · form, which is below zero beyond the band.
+LatticeForm within(const LatticeForm& form, double band_mm, double sign) {
+  return {-sign * form.x, -sign * form.y, -sign * form.z, band_mm - sign * form.constant};
 }
 
 }  // namespace
 
-/// A few rows of leaves: binned, swept and handed over.
-class MeshDistance::Chunk {
+/// Rows of leaves that one thread makes.
+class MeshDistance::Block {
  public:
-  /// `voxels`: those that exist. `features`: positions of those that may reach them, in rising
-  /// order.
-  Chunk(const MeshDistance& field, const CoordBBox& voxels,
-        std::span<const std::uint32_t> features);
-
-  void appendTo(DistanceGrids& grids);
-
- private:
+  /// What a thread keeps between blocks.
+  struct Workspace {
+    LeafDistances distances;
+    std::vector<float> bands_mm;  ///< of every leaf; empty where it is the same for all
+  };
   struct Leaf {
     std::unique_ptr<openvdb::FloatTree::LeafNodeType> surface;
     std::unique_ptr<openvdb::Vec3STree::LeafNodeType> normals;
     std::unique_ptr<openvdb::Int32Tree::LeafNodeType> closest;
   };
-  struct Row {
+  /// What it comes to.
+  struct Made {
     std::vector<Leaf> leaves;
     std::vector<Coord> interior;  ///< origins of the leaves that are wholly inside
   };
-  /// What a task of `features_per_task` features leaves behind.
-  struct Task {
-    std::vector<LatticeFeature> features;  ///< their forms are offsets until all are in place
-    std::vector<LinearForm> forms;
-    std::vector<LeafBins::Entry> entries;
-    std::vector<LeafBins::Entry> crossings;
-  };
 
-  [[nodiscard]] std::uint32_t indexOf(const Coord& leaf) const {
-    const Coord at = leaf - leaves_.min();
-    return static_cast<std::uint32_t>((at.z() * leaves_.dim().y() + at.y()) * leaves_.dim().x() +
-                                      at.x());
-  }
+  /// `voxels`: those that exist. `triangles`: those that may reach them, in the mesh's order.
+  Block(const MeshDistance& field, const CoordBBox& voxels, Workspace& workspace)
+      : field_(field),
+        all_(field.features_),
+        pitch_mm_(field.lattice_.pitch_mm),
+        per_mm_(1.0 / pitch_mm_.x(), 1.0 / pitch_mm_.y(), 1.0 / pitch_mm_.z()),
+        voxels_(voxels),
+        leaves_(voxels.min() >> 3, voxels.max() >> 3),
+        greatest_mm_(field.backgroundMm()),
+        low_mm_(voxels.min().asVec3d() * pitch_mm_ - greatest_mm_),
+        high_mm_(voxels.max().asVec3d() * pitch_mm_ + greatest_mm_),
+        kernels_(leafKernels()),
+        work_(workspace) {}
+
+  Made make(std::span<const std::uint32_t> triangles);
+
+ private:
   [[nodiscard]] LeafBits existing(const Coord& origin) const;
-  [[nodiscard]] CoordBBox reachOf(const MeshFeature& feature, double band_mm) const;
-  void describe(Task& task, std::size_t begin, std::size_t end);
+  [[nodiscard]] CoordBBox reachOf(const Vec3d& low_mm, const Vec3d& high_mm) const;
   void markBand(std::uint32_t triangle);
-  void enter(Task& task, std::size_t begin) const;
-  void sweepRow(int y, int z, Row& row) const;
-  void makeLeaf(const Coord& leaf_index, std::span<const std::uint32_t> features,
-                const LeafBits& inside, Row& row) const;
-  void addExtras(Leaf& leaf, const LeafDistances& distances) const;
+  void enter(std::uint32_t triangle);
+  void lower(MeshFeatures::Id id, double band_mm);
+  [[nodiscard]] Made sweep() const;
+  void makeLeaf(const Coord& leaf_index, const LeafBits& inside, Made& made) const;
+  void addExtras(Leaf& leaf, const std::uint32_t* names) const;
 
   const MeshDistance& field_;
+  const MeshFeatures& all_;
+  Vec3d pitch_mm_;
+  Vec3d per_mm_;  ///< voxels
   CoordBBox voxels_;
   CoordBBox leaves_;
-  std::span<const std::uint32_t> positions_;
   double greatest_mm_;
-  std::vector<Task> tasks_;
-  std::vector<std::atomic<float>> bands_mm_;  ///< of every leaf; empty where it is the same for all
-  LeafBins features_;
-  LeafBins crossings_;
-  std::vector<Row> rows_;
+  Vec3d low_mm_, high_mm_;  ///< what may matter to the voxels
+  const LeafKernels& kernels_;
+  Workspace& work_;
 };
 
-MeshDistance::Chunk::Chunk(const MeshDistance& field, const CoordBBox& voxels,
-                           std::span<const std::uint32_t> features)
-    : field_(field),
-      voxels_(voxels),
-      leaves_(voxels.min() >> 3, voxels.max() >> 3),
-      positions_(features),
-      greatest_mm_(field.backgroundMm()),
-      tasks_((features.size() + features_per_task - 1) / features_per_task) {
-  const auto leaf_count = static_cast<std::size_t>(leaves_.volume());
-  if (!(field_.band_.mm > 0)) bands_mm_ = std::vector<std::atomic<float>>(leaf_count);
-
-  const auto forEachTask = [&](const auto& work) {
-    tbb::parallel_for(std::size_t{0}, tasks_.size(), [&](std::size_t i) {
-      const std::size_t begin = i * features_per_task;
-      work(tasks_[i], begin, std::min(begin + features_per_task, positions_.size()));
-    });
-  };
-  forEachTask([&](Task& task, std::size_t begin, std::size_t end) { describe(task, begin, end); });
-  forEachTask([&](Task& task, std::size_t begin, std::size_t) { enter(task, begin); });
-  features_ = LeafBins(leaf_count, tasks_, &Task::entries);
-  crossings_ = LeafBins(leaf_count, tasks_, &Task::crossings);
-
-  const int height = leaves_.dim().y();
-  rows_.resize(static_cast<std::size_t>(height) * static_cast<std::size_t>(leaves_.dim().z()));
-  tbb::parallel_for(std::size_t{0}, rows_.size(), [&](std::size_t row) {
-    sweepRow(leaves_.min().y() + static_cast<int>(row) % height,
-             leaves_.min().z() + static_cast<int>(row) / height, rows_[row]);
-  });
+MeshDistance::Block::Made MeshDistance::Block::make(std::span<const std::uint32_t> triangles) {
+  const bool track = field_.extras_.normals || field_.extras_.closest;
+  work_.distances.begin(leaves_, track);
+  work_.bands_mm.clear();
+  if (!(field_.band_.mm > 0)) {
+    work_.bands_mm.resize(work_.distances.slots(), 0);
+    for (const std::uint32_t triangle : triangles)
+      if (all_.hasFeatures(triangle)) markBand(triangle);
+  }
+  for (const std::uint32_t triangle : triangles) enter(triangle);
+  return sweep();
 }
 
-/// The voxels within the bounding box of the feature's region; empty where there are none.
-CoordBBox MeshDistance::Chunk::reachOf(const MeshFeature& feature, double band_mm) const {
-  const Vec3d& pitch_mm = field_.lattice_.pitch_mm;
-  const Vec3d low = (feature.min - feature.below * band_mm) / pitch_mm;
-  const Vec3d high = (feature.max + feature.above * band_mm) / pitch_mm;
+/// The voxels within a box; empty where there are none.
+CoordBBox MeshDistance::Block::reachOf(const Vec3d& low_mm, const Vec3d& high_mm) const {
   CoordBBox reach;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double from = std::max(std::floor(low[axis]), static_cast<double>(voxels_.min()[axis]));
-    const double to = std::min(std::ceil(high[axis]), static_cast<double>(voxels_.max()[axis]));
+  for (int axis = 2; axis >= 0; --axis) {
+    constexpr double rounding = 1e-6;
+    const double from =
+        std::max(low_mm[axis] * per_mm_[axis] - rounding, static_cast<double>(voxels_.min()[axis]));
+    const double to = std::min(high_mm[axis] * per_mm_[axis] + rounding,
+                               static_cast<double>(voxels_.max()[axis]));
     if (!(from <= to)) return {};
-    reach.min()[axis] = static_cast<int>(from);
-    reach.max()[axis] = static_cast<int>(to);
+    reach.min()[axis] = roundedUp(from);
+    reach.max()[axis] = roundedDown(to);
+    if (reach.min()[axis] > reach.max()[axis]) return {};
   }
   return reach;
 }
 
-void MeshDistance::Chunk::describe(Task& task, std::size_t begin, std::size_t end) {
-  const MeshFeatures& all = field_.features_;
-  const Vec3d& pitch_mm = field_.lattice_.pitch_mm;
-  const double low = voxels_.min().z() * pitch_mm.z() - greatest_mm_;
-  const double high = voxels_.max().z() * pitch_mm.z() + greatest_mm_;
-  constexpr std::size_t usual_forms = 6;
-  task.features.reserve(end - begin);
-  task.forms.reserve((end - begin) * usual_forms);
-  std::vector<std::size_t> first_forms;
-  first_forms.reserve(end - begin);
-  for (std::size_t i = begin; i < end; ++i) {
-    const MeshFeatures::Id id = all.id(positions_[i]);
-    const bool face = id.kind() == MeshFeatures::Kind::face;
-    first_forms.push_back(task.forms.size());
-    if (face && !bands_mm_.empty()) markBand(id.index());
-    if (!all.meets(positions_[i], 2, low, high)) {
-      task.features.push_back({});
-      continue;
-    }
-    const MeshFeature feature = all.describe(id);
-    for (int f = 0; f < feature.rank + feature.bounds; ++f) {
-      const LinearForm& form = feature.forms[static_cast<std::size_t>(f)];
-      task.forms.push_back({form.gradient * pitch_mm, form.constant});
-    }
-    task.features.push_back({nullptr, feature.rank, feature.rank + feature.bounds, greatest_mm_,
-                             reachOf(feature, greatest_mm_)});
-    if (face) {
-      visitRowCrossings(
-          {all.corner(id.index(), 0), all.corner(id.index(), 1), all.corner(id.index(), 2)},
-          pitch_mm, voxels_, [&](const Coord& ijk, int delta) {
-            task.crossings.push_back({indexOf(ijk >> 3), RowWinding::pack(ijk, delta)});
-          });
-    }
-  }
-  for (std::size_t i = 0; i < task.features.size(); ++i)
-    task.features[i].forms = task.forms.data() + first_forms[i];
-}
-
 /// A voxel is decided by the normal at its closest surface voxel. That lies at most a band and a
 /// voxel diagonal away, and the surface at most another band from there.
-void MeshDistance::Chunk::markBand(std::uint32_t triangle) {
-  const Vec3d& pitch_mm = field_.lattice_.pitch_mm;
-  const MeshFeatures& all = field_.features_;
+void MeshDistance::Block::markBand(std::uint32_t triangle) {
   const float band_mm = field_.triangle_band_mm_[triangle];
-  const double around_mm = 2 * band_mm + pitch_mm.length();
-  MeshFeature wide;
-  wide.min = openvdb::math::minComponent(
-      openvdb::math::minComponent(all.corner(triangle, 0), all.corner(triangle, 1)),
-      all.corner(triangle, 2));
-  wide.max = openvdb::math::maxComponent(
-      openvdb::math::maxComponent(all.corner(triangle, 0), all.corner(triangle, 1)),
-      all.corner(triangle, 2));
-  wide.below = wide.above = Vec3d(1, 1, 1);
-  const CoordBBox reach = reachOf(wide, around_mm);
-  if (reach.empty()) return;
-  const Vec3d& n = all.normal(triangle);
-  const double offset = n.dot(all.corner(triangle, 0));
-  const std::array<LinearForm, 2> caps{LinearForm{n * pitch_mm, around_mm - offset},
-                                       LinearForm{-n * pitch_mm, around_mm + offset}};
-  visitLeaves(caps, reach, [&](const Coord& leaf) {
-    std::atomic<float>& band = bands_mm_[indexOf(leaf)];
-    float present = band.load(std::memory_order_relaxed);
-    while (present < band_mm &&
-           !band.compare_exchange_weak(present, band_mm, std::memory_order_relaxed)) {
-    }
-  });
+  const double around_mm = 2 * band_mm + pitch_mm_.length();
+  const Vec3d& a = all_.corner(triangle, 0);
+  const Vec3d& b = all_.corner(triangle, 1);
+  const Vec3d& c = all_.corner(triangle, 2);
+  const Vec3d low = lowest(a, b, c);
+  const Vec3d high = highest(a, b, c);
+  LatticeSheet sheet;
+  for (int axis = 0; axis < 3; ++axis) {
+    sheet.base[axis] = roundedDown((low[axis] - around_mm) * per_mm_[axis]) >> 3;
+    const int top = roundedUp((high[axis] + around_mm) * per_mm_[axis]) >> 3;
+    if (sheet.base[axis] > leaves_.max()[axis] || top < leaves_.min()[axis]) return;
+    sheet.leaves.min()[axis] = std::max(sheet.base[axis], leaves_.min()[axis]);
+    sheet.leaves.max()[axis] = std::min(top, leaves_.max()[axis]);
+  }
+  const Vec3d middle_mm =
+      ((sheet.base << 3).asVec3d() + Vec3d(0.5 * (edge - 1))) * pitch_mm_;  // of the base's voxels
+  const Vec3d step = all_.normal(triangle) * pitch_mm_;
+  sheet.form = {step.x() * edge, step.y() * edge, step.z() * edge,
+                all_.normal(triangle).dot(middle_mm - a)};
+  sheet.limit =
+      around_mm + 0.5 * (edge - 1) * (std::abs(step.x()) + std::abs(step.y()) + std::abs(step.z()));
+  kernels_.raise(sheet, band_mm, work_.distances, work_.bands_mm.data());
 }
 
-void MeshDistance::Chunk::enter(Task& task, std::size_t begin) const {
-  for (std::size_t i = 0; i < task.features.size(); ++i) {
-    const LatticeFeature& feature = task.features[i];
-    if (feature.rank == 0 || feature.reach.empty()) continue;
-    const std::span forms(feature.forms, static_cast<std::size_t>(feature.count));
-    const auto rank = static_cast<std::size_t>(feature.rank);
-    std::array<LinearForm, most_limits> limits;
-    auto end = std::copy(forms.begin() + feature.rank, forms.end(), limits.begin());
-    for (const LinearForm& form : forms.first(rank)) {
-      *end++ = {form.gradient, form.constant + greatest_mm_};
-      *end++ = {-form.gradient, greatest_mm_ - form.constant};
-    }
-    const auto reaches = [&](const Coord& leaf, double band_mm) {
-      const Vec3d centre = (leaf << 3).asVec3d() + Vec3d(0.5 * (edge - 1));
-      return std::all_of(forms.begin(), forms.begin() + feature.rank, [&](const LinearForm& form) {
-        const Vec3d& g = form.gradient;
-        const double half =
-            (std::abs(g.x()) + std::abs(g.y()) + std::abs(g.z())) * 0.5 * (edge - 1);
-        return std::abs(form.at(centre)) <= band_mm + half;
-      });
-    };
-    visitLeaves(std::span(limits.begin(), end), feature.reach, [&](const Coord& leaf) {
-      const std::uint32_t index = indexOf(leaf);
-      if (bands_mm_.empty() || reaches(leaf, bands_mm_[index]))
-        task.entries.push_back({index, static_cast<std::uint32_t>(begin + i)});
+/// Counts the rows that a triangle crosses and lowers distances to its features.
+void MeshDistance::Block::enter(std::uint32_t triangle) {
+  const Vec3d& a = all_.corner(triangle, 0);
+  const Vec3d& b = all_.corner(triangle, 1);
+  const Vec3d& c = all_.corner(triangle, 2);
+  const Vec3d low = lowest(a, b, c);
+  const Vec3d high = highest(a, b, c);
+  // Rows begin before the block: what lies there counts.
+  for (const int axis : {2, 1})
+    if (low[axis] > high_mm_[axis] || high[axis] < low_mm_[axis]) return;
+  if (all_.bounds(triangle)) {
+    visitRowCrossings({a, b, c}, pitch_mm_, voxels_, [&](const Coord& ijk, int delta) {
+      work_.distances.note(work_.distances.slot(ijk >> 3), RowWinding::pack(ijk, delta));
     });
   }
+  if (!all_.hasFeatures(triangle)) return;
+  const CoordBBox reach = reachOf(low - greatest_mm_, high + greatest_mm_);
+  if (reach.empty()) return;
+  double band_mm = greatest_mm_;
+  if (!work_.bands_mm.empty()) {
+    // The widest of the leaves that it may reach.
+    float widest_mm = 0;
+    const CoordBBox around(reach.min() >> 3, reach.max() >> 3);
+    for (int x = around.min().x(); x <= around.max().x(); ++x)
+      for (int y = around.min().y(); y <= around.max().y(); ++y) {
+        const float* column =
+            work_.bands_mm.data() + work_.distances.slot({x, y, around.min().z()});
+        widest_mm = std::max(widest_mm, *std::max_element(column, column + around.dim().z()));
+      }
+    band_mm = widest_mm;
+  }
+  all_.visit(triangle, [&](MeshFeatures::Id id) { lower(id, band_mm); });
 }
 
-LeafBits MeshDistance::Chunk::existing(const Coord& origin) const {
+void MeshDistance::Block::lower(MeshFeatures::Id id, double band_mm) {
+  if (!all_.meets(id, low_mm_, high_mm_)) return;
+  const MeshFeature feature = all_.describe(id);
+  if (feature.rank == 0) return;
+  LatticeRegion region;
+  region.reach =
+      reachOf(feature.min - feature.below * band_mm, feature.max + feature.above * band_mm);
+  if (region.reach.empty()) return;
+  // The base must not depend on the block or the band, for rounding does on it.
+  region.base = roundedDownAll(feature.min * per_mm_) & ~(edge - 1);
+  const Vec3d base_mm = region.base.asVec3d() * pitch_mm_;
+  region.rank = feature.rank;
+  for (std::size_t f = 0; f < static_cast<std::size_t>(feature.rank); ++f)
+    region.distance[f] = onLattice(feature.distance[f], pitch_mm_, base_mm);
+  std::size_t bounds = 0;
+  for (; bounds < static_cast<std::size_t>(feature.bounds); ++bounds)
+    region.bound[bounds] = onLattice(feature.bound[bounds], pitch_mm_, base_mm);
+  if (feature.rank == 1) {
+    region.bound[bounds++] = within(region.distance[0], band_mm, 1);
+    region.bound[bounds++] = within(region.distance[0], band_mm, -1);
+  }
+  if (feature.capped)
+    region.bound[bounds++] = within(onLattice(feature.cap, pitch_mm_, base_mm), band_mm, 1);
+  region.bounds = static_cast<int>(bounds);
+  kernels_.lower(region, id.packed(), field_.extras_.normals || field_.extras_.closest,
+                 work_.distances);
+}
+
+LeafBits MeshDistance::Block::existing(const Coord& origin) const {
   LeafBits bits;
   bits.fill(~0ULL);
   if (voxels_.isInside(CoordBBox::createCube(origin, edge))) return bits;
@@ -423,40 +370,43 @@ LeafBits MeshDistance::Chunk::existing(const Coord& origin) const {
   return bits;
 }
 
-void MeshDistance::Chunk::sweepRow(int y, int z, Row& row) const {
-  const std::uint32_t begin = indexOf({leaves_.min().x(), y, z});
-  const std::uint32_t end = begin + static_cast<std::uint32_t>(leaves_.dim().x());
-  if (features_.count(begin, end) + crossings_.count(begin, end) == 0) return;
-  RowWinding winding;
-  for (std::uint32_t index = begin; index < end; ++index) {
-    const std::span<const std::uint32_t> features = features_.of(index);
-    const std::span<const std::uint32_t> crossings = crossings_.of(index);
-    const bool crossed = !features.empty() || !crossings.empty();
-    if (!crossed && winding.bits() == 0) continue;
-    const Coord leaf(leaves_.min().x() + static_cast<int>(index - begin), y, z);
-    const CoordBBox box = CoordBBox::createCube(leaf << 3, edge);
-    if (!crossed && winding.bits() == ~0ULL && voxels_.isInside(box)) {
-      row.interior.push_back(box.min());
-    } else {
-      makeLeaf(leaf, features, winding.advance(crossings), row);
+/// Along x, all rows of leaves at once.
+MeshDistance::Block::Made MeshDistance::Block::sweep() const {
+  Made made;
+  std::array<RowWinding, block_rows * LeafDistances::depth> rows;
+  std::uint64_t filled = 0;  // rows with some of the inside in the last plane
+  for (int x = leaves_.min().x(); x <= leaves_.max().x(); ++x) {
+    const std::size_t first = work_.distances.slot({x, leaves_.min().y(), leaves_.min().z()});
+    const std::uint64_t occupied = work_.distances.occupied(x);
+    for (std::uint64_t left = occupied | filled; left != 0; left &= left - 1) {
+      const auto row = static_cast<std::uint32_t>(std::countr_zero(left));
+      RowWinding& winding = rows[row];
+      const Coord leaf(x, leaves_.min().y() + static_cast<int>(row) / LeafDistances::depth,
+                       leaves_.min().z() + static_cast<int>(row) % LeafDistances::depth);
+      const CoordBBox box = CoordBBox::createCube(leaf << 3, edge);
+      if (!(occupied >> row & 1) && winding.bits() == ~0ULL && voxels_.isInside(box)) {
+        made.interior.push_back(box.min());
+        continue;
+      }
+      makeLeaf(leaf, winding.advance(work_.distances, first + row), made);
+      filled = (filled & ~(1ULL << row)) | std::uint64_t{winding.bits() != 0} << row;
     }
   }
+  return made;
 }
 
-void MeshDistance::Chunk::makeLeaf(const Coord& leaf_index, std::span<const std::uint32_t> features,
-                                   const LeafBits& inside, Row& row) const {
+void MeshDistance::Block::makeLeaf(const Coord& leaf_index, const LeafBits& inside,
+                                   Made& made) const {
+  static const auto far = [] {
+    std::array<float, LeafDistances::voxels> values;
+    values.fill(std::numeric_limits<float>::infinity());
+    return values;
+  }();
   const Coord origin = leaf_index << 3;
-  const bool track = field_.extras_.normals || field_.extras_.closest;
-  const double band_mm = bands_mm_.empty() ? greatest_mm_ : double{bands_mm_[indexOf(leaf_index)]};
-  const LeafKernels& kernels = leafKernels();
-
-  LeafDistances distances;
-  std::fill_n(distances.squared, LeafDistances::voxels, std::numeric_limits<double>::infinity());
-  for (const std::uint32_t i : features) {
-    LatticeFeature feature = tasks_[i / features_per_task].features[i % features_per_task];
-    feature.band_mm = band_mm;
-    kernels.lower(feature, origin, i, track, distances);
-  }
+  const std::size_t slot = work_.distances.slot(leaf_index);
+  const float* distances = work_.distances.distances(slot);
+  const float band_mm =
+      work_.bands_mm.empty() ? static_cast<float>(greatest_mm_) : work_.bands_mm[slot];
 
   const LeafBits exists = existing(origin);
   LeafBits within;
@@ -470,25 +420,24 @@ void MeshDistance::Chunk::makeLeaf(const Coord& leaf_index, std::span<const std:
   Leaf leaf;
   leaf.surface.reset(newLeaf<openvdb::FloatTree>(origin, 0));
   const LeafBits active =
-      kernels.finish(distances, within, exists, band_mm, static_cast<float>(greatest_mm_),
-                     leaf.surface->buffer().data());
+      kernels_.finish(distances ? distances : far.data(), within, exists, band_mm,
+                      static_cast<float>(greatest_mm_), leaf.surface->buffer().data());
   const bool any_active =
       std::any_of(active.begin(), active.end(), [](std::uint64_t bits) { return bits != 0; });
   if (!any_active && !any_inside) return;
   if (!any_active && !any_outside) {
-    row.interior.push_back(origin);
+    made.interior.push_back(origin);
     return;
   }
   for (std::size_t plane = 0; plane < edge; ++plane)
     leaf.surface->getValueMask().getWord<std::uint64_t>(static_cast<openvdb::Index>(plane)) =
         active[plane];
-  if (any_active && track) addExtras(leaf, distances);
-  row.leaves.push_back(std::move(leaf));
+  if (any_active && (field_.extras_.normals || field_.extras_.closest))
+    addExtras(leaf, work_.distances.names(slot));
+  made.leaves.push_back(std::move(leaf));
 }
 
-void MeshDistance::Chunk::addExtras(Leaf& leaf, const LeafDistances& distances) const {
-  const MeshFeatures& all = field_.features_;
-  const Vec3d& pitch_mm = field_.lattice_.pitch_mm;
+void MeshDistance::Block::addExtras(Leaf& leaf, const std::uint32_t* names) const {
   const auto give = [&](auto& extra, auto* made, const auto& background) {
     extra.reset(made);
     std::fill_n(made->buffer().data(), LeafDistances::voxels, background);
@@ -502,32 +451,16 @@ void MeshDistance::Chunk::addExtras(Leaf& leaf, const LeafDistances& distances) 
 
   for (auto it = leaf.surface->cbeginValueOn(); it; ++it) {
     const openvdb::Index v = it.pos();
-    const auto i = static_cast<std::size_t>(distances.nearest[v]);
-    const std::uint32_t triangle = all.triangleOf(all.id(positions_[i]));
-    if (leaf.closest) leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(triangle);
+    const MeshFeatures::Id id(names[v]);
+    const std::uint32_t triangle = all_.triangleOf(id);
+    if (leaf.closest)
+      leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(all_.original(triangle));
     if (!leaf.normals) continue;
-    const LatticeFeature& feature = tasks_[i / features_per_task].features[i % features_per_task];
-    const Vec3d centre = it.getCoord().asVec3d();
-    Vec3d away(0, 0, 0);  // from the nearest point to the centre
-    for (int f = 0; f < feature.rank; ++f)
-      away += feature.forms[f].gradient / pitch_mm * feature.forms[f].at(centre);
+    const Vec3d away = all_.away(id, it.getCoord().asVec3d() * pitch_mm_);
     const double distance = away.length();
     const Vec3d normal =
-        distance < on_surface_mm ? all.normal(triangle) : away / (*it < 0 ? -distance : distance);
+        distance < on_surface_mm ? all_.normal(triangle) : away / (*it < 0 ? -distance : distance);
     leaf.normals->buffer().data()[v] = openvdb::Vec3s(normal);
-  }
-}
-
-void MeshDistance::Chunk::appendTo(DistanceGrids& grids) {
-  TileWriter tiles(grids.surface->tree());
-  openvdb::FloatGrid::Accessor surface = grids.surface->getAccessor();
-  for (Row& row : rows_) {
-    for (Leaf& leaf : row.leaves) {
-      if (leaf.normals) grids.normals->tree().addLeaf(leaf.normals.release());
-      if (leaf.closest) grids.closest->tree().addLeaf(leaf.closest.release());
-      surface.addLeaf(leaf.surface.release());
-    }
-    for (const Coord& origin : row.interior) tiles.set(origin, -grids.surface->background());
   }
 }
 
@@ -548,50 +481,73 @@ double bandAcross(const Vec3d& least, const Vec3d& pitch_mm) {
 
 }  // namespace
 
-MeshDistance::MeshDistance(std::shared_ptr<const Mesh> mesh, const Lattice& lattice, Band band,
-                           DistanceExtras extras)
-    : mesh_(std::move(mesh)),
-      lattice_(lattice),
+MeshDistance::MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band,
+                           DistanceExtras extras, const SwallowedWalls& walls)
+    : lattice_(lattice),
       band_(band),
       extras_(extras),
-      features_(*mesh_, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers) {
+      features_(mesh, walls, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers,
+                lattice.pitch_mm.y() * leaf_layers * block_rows,
+                band.greatestMm(lattice.pitch_mm)) {
   if (band_.mm > 0) return;
   for (const Vec3d& least : features_.leastNormals())
     triangle_band_mm_.push_back(
         static_cast<float>(bandAcross(least, lattice_.pitch_mm) * band_.diameters));
+  for (const float band_mm : triangle_band_mm_) widest_mm_ = std::max(widest_mm_, double{band_mm});
 }
 
 double MeshDistance::memoryBytes() const {
-  return static_cast<double>(mesh_->vertices.size() * sizeof(Vec3d) +
-                             mesh_->triangles.size() * sizeof(Mesh::Triangle)) +
-         static_cast<double>(triangle_band_mm_.capacity() * sizeof(float)) +
+  return static_cast<double>(triangle_band_mm_.capacity() * sizeof(float)) +
          features_.memoryBytes();
 }
 
-/// How far a feature can matter to a voxel: for the band's sake twice the band and a voxel
-/// diagonal, and up to another voxel because boxes are rounded outwards.
-double MeshDistance::reachMm() const {
-  return band_.mm > 0 ? band_.mm : 2 * (backgroundMm() + lattice_.diagonalMm());
+/// How far along an axis a triangle can matter to a voxel: for the band's sake as `markBand` looks,
+/// a voxel more because boxes are rounded outwards.
+double MeshDistance::reachMm(int axis) const {
+  return band_.mm > 0 ? band_.mm
+                      : 2 * widest_mm_ + lattice_.diagonalMm() + 2 * lattice_.pitch_mm[axis];
 }
 
-void MeshDistance::append(const CoordBBox& voxels, std::vector<std::uint32_t> features,
-                          DistanceGrids& grids) const {
-  const int middle = ((voxels.min().y() + voxels.max().y()) / 2 & ~(edge - 1)) - 1;
-  if (features.size() <= features_per_chunk || middle < voxels.min().y()) {
-    Chunk(*this, voxels, features).appendTo(grids);
-    return;
+void MeshDistance::append(const CoordBBox& voxels, DistanceGrids& grids) const {
+  const int first = voxels.min().y() >> 3;
+  const auto blocks =
+      static_cast<std::uint32_t>(((voxels.max().y() >> 3) - first) / block_rows + 1);
+  const double block_mm = block_rows * edge * lattice_.pitch_mm.y();
+  const double first_mm = first * edge * lattice_.pitch_mm.y();
+  const auto blockAt = [&](double y) {
+    return static_cast<std::uint32_t>(std::clamp((y - first_mm) / block_mm, 0.0, blocks - 1.0));
+  };
+  std::vector<Bins::Entry> entries;
+  for (const std::uint32_t triangle :
+       features_.collect(voxels.min().z() * lattice_.pitch_mm.z() - reachMm(2),
+                         voxels.max().z() * lattice_.pitch_mm.z() + reachMm(2))) {
+    const MeshFeatures::Extent extent = features_.extent(triangle, 1);
+    const std::uint32_t end = blockAt(extent.high + reachMm(1));
+    for (std::uint32_t block = blockAt(extent.low - reachMm(1)); block <= end; ++block)
+      entries.push_back({block, triangle});
   }
-  for (const bool upper : {false, true}) {
-    CoordBBox half = voxels;
-    (upper ? half.min().y() : half.max().y()) = middle + (upper ? 1 : 0);
-    std::vector<std::uint32_t> reaching;
-    std::copy_if(features.begin(), features.end(), std::back_inserter(reaching),
-                 [&](std::uint32_t position) {
-                   return features_.meets(position, 1,
-                                          half.min().y() * lattice_.pitch_mm.y() - reachMm(),
-                                          half.max().y() * lattice_.pitch_mm.y() + reachMm());
-                 });
-    append(half, std::move(reaching), grids);
+  const Bins triangles(blocks, entries);
+
+  std::vector<Block::Made> made(blocks);
+  tbb::enumerable_thread_specific<Block::Workspace> workspaces;
+  tbb::parallel_for(std::uint32_t{0}, blocks, [&](std::uint32_t block) {
+    if (triangles.of(block).empty()) return;
+    CoordBBox part = voxels;
+    const int begin = (first + static_cast<int>(block) * block_rows) * edge;
+    part.min().y() = std::max(part.min().y(), begin);
+    part.max().y() = std::min(part.max().y(), begin + block_rows * edge - 1);
+    made[block] = Block(*this, part, workspaces.local()).make(triangles.of(block));
+  });
+
+  TileWriter tiles(grids.surface->tree());
+  openvdb::FloatGrid::Accessor surface = grids.surface->getAccessor();
+  for (Block::Made& block : made) {
+    for (Block::Leaf& leaf : block.leaves) {
+      if (leaf.normals) grids.normals->tree().addLeaf(leaf.normals.release());
+      if (leaf.closest) grids.closest->tree().addLeaf(leaf.closest.release());
+      surface.addLeaf(leaf.surface.release());
+    }
+    for (const Coord& origin : block.interior) tiles.set(origin, -grids.surface->background());
   }
 }
 
@@ -616,14 +572,11 @@ DistanceGrids MeshDistance::run(ZRange core) const {
   if (lattice_.box.empty()) return grids;
   const ZRange layers = intersection(core, lattice_.layers());
   for (int begin = layers.begin; begin < layers.end;) {
-    const int end = std::min(layers.end, (begin & ~(chunk_layers - 1)) + chunk_layers);
+    const int end = std::min(layers.end, (begin & ~(edge - 1)) + chunk_layers);
     CoordBBox voxels = lattice_.box;
     voxels.min().z() = begin;
     voxels.max().z() = end - 1;
-    append(voxels,
-           features_.collect(begin * lattice_.pitch_mm.z() - reachMm(),
-                             (end - 1) * lattice_.pitch_mm.z() + reachMm()),
-           grids);
+    append(voxels, grids);
     begin = end;
   }
   openvdb::tools::prune(grids.surface->tree());

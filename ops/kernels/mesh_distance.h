@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "ops/kernels/leaf_distances.h"
 #include "ops/kernels/mesh_features.h"
 #include "vdbdither/lattice.h"
 #include "vdbdither/mesh.h"
@@ -60,11 +61,12 @@ struct DistanceGrids {
 /// is higher.
 class MeshDistance {
  public:
-  static constexpr int chunk_layers = 8 * leaf_layers;
+  static constexpr int chunk_layers = LeafDistances::depth * leaf_layers;
 
-  /// `mesh` in mm. Positions are those of the lattice.
-  MeshDistance(std::shared_ptr<const Mesh> mesh, const Lattice& lattice, Band band,
-               DistanceExtras extras = {});
+  /// `mesh` in mm, not used after this; no distance is measured to what `walls` hides of it.
+  /// Positions are those of the lattice.
+  MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band, DistanceExtras extras = {},
+               const SwallowedWalls& walls = {});
 
   /// The layers of `core`, clipped to the lattice's box. Const, in any order, from many threads at
   /// once.
@@ -76,24 +78,23 @@ class MeshDistance {
 
   [[nodiscard]] double backgroundMm() const { return band_.greatestMm(lattice_.pitch_mm); }
 
-  /// Bytes held from construction on, the mesh included.
+  /// Bytes held from construction on, a copy of the mesh included.
   [[nodiscard]] double memoryBytes() const;
 
  private:
-  class Chunk;
+  class Block;
 
-  [[nodiscard]] double reachMm() const;
-  /// Makes `voxels`, which `features` may reach, in one piece or in several.
-  void append(const openvdb::CoordBBox& voxels, std::vector<std::uint32_t> features,
-              DistanceGrids& grids) const;
+  [[nodiscard]] double reachMm(int axis) const;
+  /// Makes `voxels`, of at most `chunk_layers` layers.
+  void append(const openvdb::CoordBBox& voxels, DistanceGrids& grids) const;
 
-  std::shared_ptr<const Mesh> mesh_;
   Lattice lattice_;
   Band band_;
   DistanceExtras extras_;
   MeshFeatures features_;
   std::vector<float>
       triangle_band_mm_;  ///< of the face and its edges; empty where the band is in mm
+  double widest_mm_ = 0;  ///< of these
 };
 
 }  // namespace vdbdither

@@ -5,39 +5,48 @@
 
 namespace vdbdither {
 
-MeshEdges::MeshEdges(const Mesh& mesh) {
-  struct Side {
-    std::uint32_t to, half;
+namespace {
+
+/// Few vertices have more edges than a handful.
+void sortFew(std::uint64_t* begin, std::uint64_t* end) {
+  constexpr std::ptrdiff_t few = 24;
+  if (end - begin > few) return std::sort(begin, end);
+  for (std::uint64_t* it = begin; it < end; ++it) {
+    const std::uint64_t value = *it;
+    std::uint64_t* to = it;
+    for (; to > begin && to[-1] > value; --to) *to = to[-1];
+    *to = value;
+  }
+}
+
+}  // namespace
+
+MeshEdges::MeshEdges(const Mesh& mesh, std::size_t triangles) {
+  // By the lower end of a side: its other end and its half-edge, to sort by both.
+  const std::span some(mesh.triangles.data(), triangles);
+  const auto forEachSide = [&some](const auto& work) {
+    std::uint64_t half = 0;
+    for (const Mesh::Triangle& t : some)
+      for (std::size_t side = 0; side < 3; ++side, ++half) {
+        const auto [from, to] = std::minmax(t[side], t[side < 2 ? side + 1 : 0]);
+        if (from != to) work(from, std::uint64_t{to} << 32 | half);
+      }
   };
-  const auto ends = [&mesh](std::size_t half) {
-    const Mesh::Triangle& t = mesh.triangles[half / 3];
-    return std::minmax({t[half % 3], t[(half + 1) % 3]});
-  };
-  const std::size_t halves = 3 * mesh.triangles.size();
   std::vector<std::uint32_t> first(mesh.vertices.size() + 1, 0);
-  for (std::size_t half = 0; half < halves; ++half) {
-    const auto [from, to] = ends(half);
-    if (from != to) ++first[from + 1];
-  }
+  forEachSide([&](std::uint32_t from, std::uint64_t) { ++first[from + 1]; });
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) first[v + 1] += first[v];
-  std::vector<Side> sorted(first.back());
+  std::vector<std::uint64_t> sides(first.back());
   std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
-  for (std::size_t half = 0; half < halves; ++half) {
-    const auto [from, to] = ends(half);
-    if (from != to) sorted[next[from]++] = {to, static_cast<std::uint32_t>(half)};
-  }
-  halves_.reserve(sorted.size());
-  edges_.reserve(sorted.size() / 2 + 1);
+  forEachSide([&](std::uint32_t from, std::uint64_t side) { sides[next[from]++] = side; });
+  halves_.reserve(sides.size());
+  edges_.reserve(sides.size() / 2 + 1);
   for (std::uint32_t from = 0; from < mesh.vertices.size(); ++from) {
-    const auto begin = sorted.begin() + first[from];
-    const auto end = sorted.begin() + first[from + 1];
-    std::sort(begin, end, [](const Side& a, const Side& b) {
-      return std::pair(a.to, a.half) < std::pair(b.to, b.half);
-    });
-    for (auto it = begin; it != end; ++it) {
-      if (it == begin || it->to != std::prev(it)->to)
-        edges_.push_back({from, it->to, static_cast<std::uint32_t>(halves_.size())});
-      halves_.push_back(it->half);
+    sortFew(sides.data() + first[from], sides.data() + first[from + 1]);
+    for (std::uint32_t i = first[from]; i < first[from + 1]; ++i) {
+      const auto to = static_cast<std::uint32_t>(sides[i] >> 32);
+      if (i == first[from] || to != sides[i - 1] >> 32)
+        edges_.push_back({from, to, static_cast<std::uint32_t>(halves_.size())});
+      halves_.push_back(static_cast<std::uint32_t>(sides[i]));
     }
   }
   edges_.push_back({0, 0, static_cast<std::uint32_t>(halves_.size())});

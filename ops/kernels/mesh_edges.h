@@ -18,7 +18,9 @@ class MeshEdges {
     std::uint32_t first = 0;         ///< where its half-edges begin
   };
 
-  explicit MeshEdges(const Mesh& mesh);
+  explicit MeshEdges(const Mesh& mesh) : MeshEdges(mesh, mesh.triangles.size()) {}
+  /// Of the first `triangles` triangles alone.
+  MeshEdges(const Mesh& mesh, std::size_t triangles);
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(edges_.size() - 1); }
   [[nodiscard]] const Edge& operator[](std::uint32_t edge) const { return edges_[edge]; }

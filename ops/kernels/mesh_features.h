@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -7,6 +8,7 @@
 #include <openvdb/math/Vec3.h>
 
 #include "ops/kernels/mesh_edges.h"
+#include "ops/kernels/swallowed_walls.h"
 #include "vdbdither/mesh.h"
 
 namespace vdbdither {
@@ -28,14 +30,19 @@ struct MeshFeature {
   static constexpr int max_bounds = 16;
 
   int rank = 0;  ///< 1 face, 2 edge, 3 vertex; 0 for a face without area, which its edges stand for
-  int bounds = 0;  ///< how many bounds follow the distance forms
-  std::array<LinearForm, 3 + max_bounds> forms;
+  int bounds = 0;
+  std::array<LinearForm, 3> distance;  ///< in mm
+  std::array<LinearForm, max_bounds> bound;
+  /// Where it has one, a form in mm that is nowhere in the region above the distance.
+  LinearForm cap;
+  bool capped = false;
   openvdb::Vec3d min, max;  ///< bounding box of the feature, mm
   openvdb::Vec3d below,
       above;  ///< the region within distance b lies from min − b·below to max + b·above
 };
 
-/// The faces, edges and vertices of a mesh in rising order of their lowest layer.
+/// The triangles of a mesh in rising order of their lowest layer, then row, and the faces, edges
+/// and vertices that each answers for: every edge and vertex belongs to the first of its triangles.
 ///
 /// Any set of triangles will do. Where triangles share vertices the regions of neighbours hardly
 /// overlap, so that the work of a distance field follows its voxels instead of its triangles.
@@ -46,39 +53,78 @@ class MeshFeatures {
    public:
     Id() = default;
     Id(Kind kind, std::uint32_t index) : packed_(index << 2 | static_cast<std::uint32_t>(kind)) {}
+    explicit Id(std::uint32_t packed) : packed_(packed) {}
     [[nodiscard]] Kind kind() const { return static_cast<Kind>(packed_ & 3); }
     /// Of the triangle, the edge or the vertex.
     [[nodiscard]] std::uint32_t index() const { return packed_ >> 2; }
+    [[nodiscard]] std::uint32_t packed() const { return packed_; }
 
    private:
     std::uint32_t packed_ = 0;
   };
+  struct Extent {
+    double low, high;
+  };
 
-  /// `mesh` in mm, kept by reference; positions are taken relative to `origin_mm`. `layer_mm` is
-  /// the height of the bins that the order is made by.
-  MeshFeatures(const Mesh& mesh, const openvdb::Vec3d& origin_mm, double layer_mm);
+  /// `mesh` in mm, of which a sorted copy is kept; positions are taken relative to `origin_mm`.
+  /// `layer_mm` and `row_mm` are the sizes of the bins along z and y that the order is made by.
+  /// Distances above `greatest_mm` are not asked for. Triangles that `walls` hides have no
+  /// features, the pieces that are left of them have.
+  MeshFeatures(const Mesh& mesh, const SwallowedWalls& walls, const openvdb::Vec3d& origin_mm,
+               double layer_mm, double row_mm, double greatest_mm);
 
   [[nodiscard]] double memoryBytes() const;
-  [[nodiscard]] std::size_t size() const { return order_.size(); }
-  [[nodiscard]] Id id(std::size_t position) const { return order_[position]; }
 
-  /// The positions of the features that meet the layers [low, high] mm, in rising order.
+  /// The triangles that meet the layers [low, high] mm, in order. A triangle's number is its place
+  /// in the order.
   [[nodiscard]] std::vector<std::uint32_t> collect(double low, double high) const;
 
-  /// Whether the feature at `position` meets [low, high] mm along `axis`.
-  [[nodiscard]] bool meets(std::uint32_t position, int axis, double low, double high) const {
-    const Extent extent = this->extent(order_[position], axis);
-    return extent.low <= high && extent.high >= low;
+  /// Whether rows that cross the triangle enter or leave the solid; not for pieces.
+  [[nodiscard]] bool bounds(std::uint32_t triangle) const {
+    return triangle < whole_ || triangle >= features_;
+  }
+  /// Whether distances are measured to the triangle.
+  [[nodiscard]] bool hasFeatures(std::uint32_t triangle) const { return triangle < features_; }
+
+  /// What a triangle takes along an axis.
+  [[nodiscard]] Extent extent(std::uint32_t triangle, int axis) const {
+    const Mesh::Triangle& t = mesh_.triangles[triangle];
+    const double a = mesh_.vertices[t[0]][axis];
+    const double b = mesh_.vertices[t[1]][axis];
+    const double c = mesh_.vertices[t[2]][axis];
+    return {std::min(std::min(a, b), c), std::max(std::max(a, b), c)};
+  }
+
+  /// Calls visit(id) for the features that the triangle answers for, but those that no distance is
+  /// needed from.
+  template <class Visit>
+  void visit(std::uint32_t triangle, const Visit& visit) const {
+    const std::uint8_t owned = owned_[triangle];
+    visit(Id(Kind::face, triangle));
+    for (std::uint32_t side = 0; side < 3; ++side)
+      if (owned >> side & 1) visit(Id(Kind::edge, side_edges_[3 * triangle + side]));
+    for (std::uint32_t corner = 0; corner < 3; ++corner)
+      if (owned >> (3 + corner) & 1) visit(Id(Kind::vertex, mesh_.triangles[triangle][corner]));
+  }
+
+  /// Whether the feature's bounding box meets the layers and rows [low, high] mm; any face does.
+  [[nodiscard]] bool meets(Id id, const openvdb::Vec3d& low, const openvdb::Vec3d& high) const {
+    if (id.kind() == Kind::face) return true;
+    const bool edge = id.kind() == Kind::edge;
+    const openvdb::Vec3d& a = mesh_.vertices[edge ? edges_[id.index()].from : id.index()];
+    const openvdb::Vec3d& b = mesh_.vertices[edge ? edges_[id.index()].to : id.index()];
+    return std::min(a.z(), b.z()) <= high.z() && std::max(a.z(), b.z()) >= low.z() &&
+           std::min(a.y(), b.y()) <= high.y() && std::max(a.y(), b.y()) >= low.y();
   }
 
   [[nodiscard]] MeshFeature describe(Id id) const;
 
+  /// From the nearest point of the feature's plane, line or point to p.
+  [[nodiscard]] openvdb::Vec3d away(Id id, const openvdb::Vec3d& p) const;
+
   /// Corner `corner` of a triangle, relative to the origin.
   [[nodiscard]] const openvdb::Vec3d& corner(std::uint32_t triangle, int corner) const {
-    return positions_[mesh_.triangles[triangle][static_cast<std::size_t>(corner)]];
-  }
-  [[nodiscard]] const Mesh::Triangle& triangle(std::uint32_t index) const {
-    return mesh_.triangles[index];
+    return mesh_.vertices[mesh_.triangles[triangle][static_cast<std::size_t>(corner)]];
   }
   /// Unit normal, counter-clockwise; zero for a face without area.
   [[nodiscard]] const openvdb::Vec3d& normal(std::uint32_t triangle) const {
@@ -89,31 +135,37 @@ class MeshFeatures {
   /// come to at least.
   [[nodiscard]] std::vector<openvdb::Vec3d> leastNormals() const;
 
-  /// The lowest triangle that the feature belongs to.
+  /// The number that a triangle has in the mesh that was given.
+  [[nodiscard]] std::uint32_t original(std::uint32_t triangle) const { return original_[triangle]; }
+
+  /// Of the triangles that the feature belongs to the one that comes first in the mesh given.
   [[nodiscard]] std::uint32_t triangleOf(Id id) const;
 
  private:
-  struct Extent {
-    double low, high;
-  };
-
+  Mesh sorted(const Mesh& mesh, const SwallowedWalls& walls, const openvdb::Vec3d& origin_mm,
+              double layer_mm, double row_mm);
   void findNormals();
   void findNeighbours();
-  void sortByLayer(double layer_mm);
+  void findOwned(double greatest_mm);
+  void findBlocks();
 
-  [[nodiscard]] Extent extent(Id id, int axis) const;
+  [[nodiscard]] bool isFlat(std::uint32_t edge, double greatest_mm) const;
   [[nodiscard]] MeshFeature describeFace(std::uint32_t triangle) const;
   [[nodiscard]] MeshFeature describeEdge(std::uint32_t index) const;
   [[nodiscard]] MeshFeature describeVertex(std::uint32_t index) const;
 
-  const Mesh& mesh_;
-  std::vector<openvdb::Vec3d> positions_;
+  // Whole triangles come first, then pieces, then hidden triangles.
+  std::uint32_t whole_ = 0;              ///< end of the first
+  std::uint32_t features_ = 0;           ///< and of the second
+  std::vector<std::uint32_t> original_;  ///< by triangle
+  Mesh mesh_;
   std::vector<openvdb::Vec3d> normals_;
   MeshEdges edges_;
   std::vector<std::uint32_t> first_edge_;  ///< by vertex, and the end of the last
   std::vector<std::uint32_t> vertex_edges_;
-  std::vector<Id> order_;
-  std::vector<Extent> blocks_;  ///< of every `block_size` features in order
+  std::vector<std::uint32_t> side_edges_;  ///< by half-edge
+  std::vector<std::uint8_t> owned_;        ///< by triangle: bits of its sides, then of its corners
+  std::vector<Extent> blocks_;             ///< of every `block_size` triangles in order
 };
 
 }  // namespace vdbdither

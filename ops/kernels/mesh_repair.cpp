@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "ops/kernels/mesh_edges.h"
+#include "ops/kernels/winding_number.h"
 
 namespace vdbdither {
 
@@ -198,19 +199,6 @@ std::vector<std::uint32_t> orient(Mesh& mesh, MeshRepairs& repairs) {
   return part;
 }
 
-/// 4π times what the triangle adds to the generalized winding number at p (van Oosterom and
-/// Strackee 1983).
-double solidAngle(const Mesh& mesh, const Triangle& t, const Vec3d& p) {
-  const Vec3d a = mesh.vertices[t[0]] - p;
-  const Vec3d b = mesh.vertices[t[1]] - p;
-  const Vec3d c = mesh.vertices[t[2]] - p;
-  const double la = a.length();
-  const double lb = b.length();
-  const double lc = c.length();
-  return 2 * std::atan2(a.dot(b.cross(c)),
-                        la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-}
-
 /// Turns the parts of negative volume that no other part surrounds.
 void turnInsideOut(Mesh& mesh, const std::vector<std::uint32_t>& part, MeshRepairs& repairs) {
   struct Part {
@@ -242,7 +230,10 @@ void turnInsideOut(Mesh& mesh, const std::vector<std::uint32_t>& part, MeshRepai
     for (const Part& other : parts) {
       if (&other == &own || !other.bounds.isInside(own.bounds)) continue;
       for (const std::uint32_t i : other.triangles)
-        around += solidAngle(mesh, mesh.triangles[i], p);
+        around +=
+            solidAngle({mesh.vertices[mesh.triangles[i][0]], mesh.vertices[mesh.triangles[i][1]],
+                        mesh.vertices[mesh.triangles[i][2]]},
+                       p);
     }
     if (std::abs(around) > 2 * std::numbers::pi) continue;
     for (const std::uint32_t i : own.triangles)
@@ -322,6 +313,10 @@ std::vector<std::string> MeshRepairs::lines() const {
   tell(turned_parts, "part turned that was inside out", "parts turned that were inside out");
   tell(boundary_edges, "boundary edge", "boundary edges");
   tell(closed_holes, "hole filled", "holes filled");
+  tell(swallowed_triangles, "triangle within the solid is no surface",
+       "triangles within the solid are no surface");
+  tell(cut_triangles, "triangle lies partly within the solid",
+       "triangles lie partly within the solid");
   return lines;
 }
 

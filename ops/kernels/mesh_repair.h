@@ -18,6 +18,8 @@ struct MeshRepairs {
   std::uint64_t boundary_edges = 0;       ///< sides that no triangle met from the other side
   std::uint64_t closed_holes = 0;         ///< loops of them that were filled
   std::uint64_t filling_triangles = 0;    ///< what they were filled with: the last of the mesh
+  std::uint64_t swallowed_triangles = 0;  ///< left out of the surface: wholly within the solid
+  std::uint64_t cut_triangles = 0;        ///< left out in part
 
   /// One line for each kind that occurred.
   [[nodiscard]] std::vector<std::string> lines() const;

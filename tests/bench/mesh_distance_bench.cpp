@@ -75,7 +75,7 @@ void ours(benchmark::State& state, const Part& part, Band band, int threads, int
   const double before = peakBytes();
   for (auto _ : state) {
     voxels = 0;
-    const MeshDistance field(part.mesh, part.lattice, band);
+    const MeshDistance field(*part.mesh, part.lattice, band);
     const int height = layers_at_once > 0 ? layers_at_once : all.size();
     for (int begin = all.begin; begin < all.end; begin += height)
       voxels += static_cast<double>(field.run({begin, begin + height}).surface->activeVoxelCount());

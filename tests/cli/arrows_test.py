@@ -45,7 +45,7 @@ class Arrows(unittest.TestCase):
         self.assertEqual([path.name for path in sources("ops") if path.suffix == ".h"], [])
 
     def test_kernels_know_no_pipeline(self):
-        vocabulary = ("errors", "lattice", "mesh", "openvdb", "visit_grid")
+        vocabulary = ("errors", "grid", "lattice", "mesh", "openvdb", "visit_grid")
         self.assert_includes("ops/kernels", "ops/kernels/", *(f"vdbdither/{name}.h" for name in vocabulary))
 
     def test_nothing_but_tests_includes_tests(self):

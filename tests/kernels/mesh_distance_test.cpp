@@ -10,6 +10,7 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/global_control.h>
 
+#include "ops/kernels/winding_number.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/layers.h"
 
@@ -60,20 +61,6 @@ Nearest bruteForce(const Mesh& mesh, const Vec3d& p) {
   return best;
 }
 
-/// Generalized winding number (van Oosterom and Strackee's solid angles).
-double windingNumber(const Mesh& mesh, const Vec3d& p) {
-  double sum = 0;
-  for (const Mesh::Triangle& t : mesh.triangles) {
-    const Vec3d a = mesh.vertices[t[0]] - p;
-    const Vec3d b = mesh.vertices[t[1]] - p;
-    const Vec3d c = mesh.vertices[t[2]] - p;
-    const double la = a.length(), lb = b.length(), lc = c.length();
-    sum += 2 * std::atan2(a.dot(b.cross(c)),
-                          la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return sum / (4 * std::numbers::pi);
-}
-
 Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm, const Vec3d& origin_mm, int margin) {
   openvdb::math::BBox<Vec3d> bounds;
   for (const Vec3d& v : mesh.vertices) bounds.expand(v);
@@ -85,8 +72,7 @@ Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm, const Vec3d& orig
 
 DistanceGrids distances(const Mesh& mesh, const Lattice& lattice, double band_mm,
                         DistanceExtras extras = {}) {
-  return MeshDistance(std::make_shared<Mesh>(mesh), lattice, Band{0, band_mm}, extras)
-      .run(lattice.layers());
+  return MeshDistance(mesh, lattice, Band{0, band_mm}, extras).run(lattice.layers());
 }
 
 const Vec3d mimaki(0.042, 0.084, 0.022);
@@ -98,6 +84,7 @@ void expectExact(const Mesh& mesh, const Lattice& lattice, double band_mm, bool 
   const DistanceGrids grids = distances(mesh, lattice, band_mm);
   const openvdb::FloatGrid::ConstAccessor surface = grids.surface->getConstAccessor();
   const auto background = static_cast<float>(band_mm);
+  const WindingNumber winding(mesh);
   std::mt19937 random(7);
   int active = 0;
   int wrong = 0;
@@ -122,7 +109,7 @@ void expectExact(const Mesh& mesh, const Lattice& lattice, double band_mm, bool 
         ++wrong, ADD_FAILURE() << ijk << " is inactive with " << value;
     }
     if (closed && exact > 1e-6 && (!on || random() % 4 == 0)) {
-      const bool inside = std::abs(windingNumber(mesh, p)) > 0.5;
+      const bool inside = std::abs(winding.exactAt(p)) > 0.5;
       if (inside != (value < 0)) ++wrong, ADD_FAILURE() << ijk << " has the wrong sign: " << value;
     }
   }
@@ -257,7 +244,7 @@ TEST(MeshDistance, SlabsOfAnyHeightGiveTheWhole) {
   const Mesh mesh = transformed(torusMesh({0, 0, 0}, 0.8, 0.3, 30), {20, 30, 0}, {0.3, 0, 0});
   const Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);
   for (const Band band : {Band{}, Band{0, 0.12}}) {
-    const MeshDistance field(std::make_shared<Mesh>(mesh), lattice, band);
+    const MeshDistance field(mesh, lattice, band);
     const DistanceGrids whole = field.run(lattice.layers());
     for (const int height : {8, 16, 40}) {
       std::vector<Layers> pieces;
@@ -299,11 +286,10 @@ double diameterAlong(const Vec3d& n, const Vec3d& pitch_mm) {
 /// voxel.
 void expectBandForDithering(const Mesh& mesh, const Vec3d& pitch_mm) {
   const Lattice lattice = latticeAround(mesh, pitch_mm, {0, 0, 0}, 8);
-  const auto shared = std::make_shared<Mesh>(mesh);
   const DistanceGrids wide =
-      MeshDistance(shared, lattice, Band{0, 2.5 * pitch_mm.length()}, {true, false})
+      MeshDistance(mesh, lattice, Band{0, 2.5 * pitch_mm.length()}, {true, false})
           .run(lattice.layers());
-  const DistanceGrids band = MeshDistance(shared, lattice, Band{}).run(lattice.layers());
+  const DistanceGrids band = MeshDistance(mesh, lattice, Band{}).run(lattice.layers());
   EXPECT_LT(band.surface->activeVoxelCount(), wide.surface->activeVoxelCount() / 2);
   const openvdb::FloatTree& exact = wide.surface->tree();
   const openvdb::FloatTree& kept = band.surface->tree();

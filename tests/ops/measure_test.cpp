@@ -197,6 +197,15 @@ TEST_F(Measure, RefusesWhatCannotBeMeasured) {
       ThrowsMessage<UsageError>(HasSubstr("exists; --overwrite replaces it")));
   EXPECT_THAT(plan({"--reference", file("part.stl")}),
               ThrowsMessage<DataError>(HasSubstr("there is none")));
+  Mesh open = test::boxMesh({0, 0, 0}, {1, 1, 1});
+  open.triangles.pop_back();
+  save(open, "open.stl");
+  EXPECT_THAT(
+      [&] {
+        Measuring({file("open.stl"), "--reference", file("part.stl"), "--smooth", "taubin"})
+            .run({});
+      },
+      ThrowsMessage<DataError>(HasSubstr("is no closed mesh")));
   const auto nothing = BoolGrid::create(false);
   nothing->setName("solid");
   const Lattice lattice{{1, 1, 1}, {0, 0, 0}, CoordBBox(Coord(0), Coord(7))};

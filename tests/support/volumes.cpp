@@ -56,9 +56,7 @@ FloatGrid::Ptr sampled(const Distance& distance, const Lattice& lattice, double 
   auto grid = FloatGrid::create(band);
   grid->setName("surface");
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  auto map = std::make_shared<openvdb::math::ScaleMap>(lattice.pitch_mm);
-  grid->setTransform(std::make_shared<openvdb::math::Transform>(map));
-  grid->transform().postTranslate(lattice.origin_mm);
+  grid->setTransform(transformOf(lattice));
   auto accessor = grid->getAccessor();
   for (auto ijk = lattice.box.begin(); ijk; ++ijk) {
     const auto d = static_cast<float>(distance(lattice.position(*ijk)));

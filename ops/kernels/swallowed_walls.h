@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "vdbdither/mesh.h"
+
+namespace vdbdither {
+
+/// What of a mesh is not surface of the solid that it bounds: walls of shells that overlap, folds
+/// that pass through another wall, membranes between coinciding faces.
+struct SwallowedWalls {
+  std::vector<bool> hidden;  ///< by triangle: no surface, or replaced by pieces; empty for none
+  Mesh pieces;               ///< what others leave of the triangles that they cut
+  std::vector<std::uint32_t> piece_of;  ///< by piece: the triangle
+  std::uint64_t swallowed = 0;          ///< triangles of which nothing is left
+  std::uint64_t cut = 0;                ///< triangles of which pieces are left
+};
+
+/// The walls of `mesh` (in mm, closed) within its solid, which is where the winding number is not
+/// zero. Triangles that intersect others are cut along the planes of these; the cuts are exact to
+/// rounding. Deterministic.
+SwallowedWalls swallowedWalls(const Mesh& mesh);
+
+}  // namespace vdbdither

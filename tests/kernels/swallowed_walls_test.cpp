@@ -1,0 +1,128 @@
+#include "ops/kernels/swallowed_walls.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+#include <openvdb/math/BBox.h>
+
+#include "ops/kernels/mesh_distance.h"
+#include "tests/support/shapes.h"
+
+namespace vdbdither {
+namespace {
+
+using openvdb::CoordBBox;
+using openvdb::Vec3d;
+using Box = openvdb::math::BBox<Vec3d>;
+
+Mesh together(const std::vector<Mesh>& parts) {
+  Mesh all;
+  for (const Mesh& part : parts) {
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
+    for (const Mesh::Triangle& t : part.triangles)
+      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  return all;
+}
+
+Mesh meshOf(const std::vector<Box>& boxes) {
+  std::vector<Mesh> parts;
+  for (const Box& box : boxes) parts.push_back(test::boxMesh(box.min(), box.max()));
+  return together(parts);
+}
+
+double distanceTo(const Box& box, const Vec3d& p) {
+  const Vec3d nearest =
+      openvdb::math::maxComponent(box.min(), openvdb::math::minComponent(box.max(), p));
+  return (nearest - p).length();
+}
+
+/// The signed distance from the union of boxes: to the nearest cell of the other kind, of those
+/// that all their faces' planes part space into.
+double distanceToUnion(const std::vector<Box>& boxes, const Vec3d& p) {
+  std::array<std::vector<double>, 3> cuts;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double>& own = cuts[static_cast<std::size_t>(axis)];
+    own = {-100, 100};
+    for (const Box& box : boxes) own.insert(own.end(), {box.min()[axis], box.max()[axis]});
+    std::sort(own.begin(), own.end());
+    own.erase(std::unique(own.begin(), own.end()), own.end());
+  }
+  const auto holds = [&](const Vec3d& at) {
+    return std::any_of(boxes.begin(), boxes.end(),
+                       [&](const Box& box) { return box.isInside(at); });
+  };
+  double to_solid = std::numeric_limits<double>::infinity();
+  double to_air = to_solid;
+  for (std::size_t i = 0; i + 1 < cuts[0].size(); ++i)
+    for (std::size_t j = 0; j + 1 < cuts[1].size(); ++j)
+      for (std::size_t k = 0; k + 1 < cuts[2].size(); ++k) {
+        const Box cell(Vec3d(cuts[0][i], cuts[1][j], cuts[2][k]),
+                       Vec3d(cuts[0][i + 1], cuts[1][j + 1], cuts[2][k + 1]));
+        double& nearest = holds(cell.getCenter()) ? to_solid : to_air;
+        nearest = std::min(nearest, distanceTo(cell, p));
+      }
+  return to_solid > 0 ? to_solid : -to_air;
+}
+
+/// Checks every voxel around the boxes: far inside, near swallowed walls and near the surface.
+void expectDistancesToTheUnion(const std::vector<Box>& boxes) {
+  const Vec3d pitch_mm(0.042, 0.084, 0.022);
+  const Lattice lattice{pitch_mm, Vec3d(0, 0, 0),
+                        CoordBBox(openvdb::Coord(-4, -3, -8), openvdb::Coord(34, 18, 64))};
+  const Mesh mesh = meshOf(boxes);
+  const DistanceGrids grids =
+      MeshDistance(mesh, lattice, Band{0, 0.3}, {}, swallowedWalls(mesh)).run(lattice.layers());
+  int inside = 0;
+  for (const openvdb::Coord& ijk : lattice.box) {
+    const double exact = distanceToUnion(boxes, lattice.position(ijk));
+    if (std::abs(exact) < 1e-6 || std::abs(std::abs(exact) - 0.3) < 1e-6) continue;
+    inside += exact < 0;
+    ASSERT_NEAR(grids.surface->tree().getValue(ijk), std::clamp(exact, -0.3, 0.3), 1e-6) << ijk;
+  }
+  EXPECT_GT(inside, 1000);
+}
+
+TEST(SwallowedWalls, ACleanMeshHasNone) {
+  EXPECT_TRUE(swallowedWalls(test::torusMesh({0, 0, 0}, 1, 0.4, 20)).hidden.empty());
+  EXPECT_TRUE(swallowedWalls(test::boxMesh({0, 0, 0}, {1, 2, 3})).hidden.empty());
+  EXPECT_TRUE(swallowedWalls(Mesh{}).hidden.empty());
+}
+
+TEST(SwallowedWalls, DistancesAreThoseToTheUnionOfOverlappingShells) {
+  expectDistancesToTheUnion({Box(Vec3d(0.01, 0.02, 0.03), Vec3d(0.8, 0.9, 0.71)),
+                             Box(Vec3d(0.4, 0.33, 0.25), Vec3d(1.2, 1.3, 1.1)),
+                             Box(Vec3d(0.1, 0.5, 0.6), Vec3d(0.6, 1.1, 1.2))});
+}
+
+TEST(SwallowedWalls, APartWithinAnotherIsNoSurface) {
+  const std::vector<Box> boxes{Box(Vec3d(0.01, 0.02, 0.03), Vec3d(1.1, 1.2, 1.1)),
+                               Box(Vec3d(0.3, 0.33, 0.25), Vec3d(0.7, 0.8, 0.9))};
+  const SwallowedWalls walls = swallowedWalls(meshOf(boxes));
+  EXPECT_EQ(walls.swallowed, 12U);
+  EXPECT_EQ(walls.cut, 0U);
+  expectDistancesToTheUnion(boxes);
+}
+
+TEST(SwallowedWalls, TouchingShellsHaveNoMembraneBetweenThem) {
+  expectDistancesToTheUnion({Box(Vec3d(0.01, 0.02, 0.03), Vec3d(0.6, 0.9, 0.71)),
+                             Box(Vec3d(0.6, 0.3, 0.2), Vec3d(1.2, 1.1, 1.1))});
+}
+
+TEST(SwallowedWalls, FacesInOnePlaneStaySurface) {
+  expectDistancesToTheUnion({Box(Vec3d(0.01, 0.02, 0.03), Vec3d(0.6, 0.9, 0.71)),
+                             Box(Vec3d(0.4, 0.3, 0.03), Vec3d(1.2, 1.1, 0.71))});
+}
+
+TEST(SwallowedWalls, ACavityIsSurface) {
+  Mesh cavity = test::boxMesh({0.3, 0.3, 0.3}, {0.7, 0.7, 0.7});
+  for (Mesh::Triangle& t : cavity.triangles) std::swap(t[0], t[1]);
+  EXPECT_TRUE(
+      swallowedWalls(together({test::boxMesh({0, 0, 0}, {1, 1, 1}), cavity})).hidden.empty());
+}
+
+}  // namespace
+}  // namespace vdbdither

@@ -1,0 +1,47 @@
+#include "ops/kernels/winding_number.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/shapes.h"
+
+namespace vdbdither {
+namespace {
+
+using openvdb::Vec3d;
+
+TEST(WindingNumber, IsOneInsideAClosedSurfaceAHalfOnItAndZeroOutside) {
+  const Mesh mesh = test::boxMesh({-1, -1, -1}, {1, 1, 1});
+  const WindingNumber winding(mesh);
+  EXPECT_NEAR(winding.exactAt({0.2, 0.3, -0.4}), 1, 1e-12);
+  EXPECT_NEAR(winding.exactAt({0.2, 0.3, 1}), 0.5, 1e-12);
+  EXPECT_NEAR(winding.exactAt({0.2, 0.3, 1.4}), 0, 1e-12);
+}
+
+TEST(WindingNumber, TheFastOneIsCloseToTheExactOneOnClosedAndOpenSurfaces) {
+  Mesh mesh = test::torusMesh({0, 0, 0}, 0.8, 0.3, 60);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(-1.5, 1.5);
+  for (int open = 0; open < 2; ++open) {
+    const WindingNumber winding(mesh);
+    int inside = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3d p(uniform(random), uniform(random), 0.3 * uniform(random));
+      const double exact = winding.exactAt(p);
+      inside += exact > 0.5;
+      ASSERT_NEAR(winding.at(p), exact, 0.02) << p;
+    }
+    EXPECT_GT(inside, 200);
+    mesh.triangles.resize(mesh.triangles.size() * 3 / 4);
+  }
+}
+
+TEST(WindingNumber, OfNoTrianglesIsZero) {
+  const Mesh mesh;
+  EXPECT_EQ(WindingNumber(mesh).at({1, 2, 3}), 0);
+}
+
+}  // namespace
+}  // namespace vdbdither
