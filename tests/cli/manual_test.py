@@ -33,7 +33,7 @@ class Manual(ProgramTest):
     def test_every_verb_has_a_manual_page_that_man_accepts(self):
         self.succeed("docs", "man", "man")
         self.assertEqual(sorted(path.name for path in (self.folder / "man").iterdir()),
-                         sorted([f"vdbdither-{name}.1" for name in [*operators(), "printers"]] + ["vdbdither.1"]))
+                         sorted([f"vdbdither-{name}.1" for name in [*operators(), "printers", "ssim"]] + ["vdbdither.1"]))
         if not shutil.which("groff"):
             self.skipTest("groff is not installed")
         for page in (self.folder / "man").iterdir():
