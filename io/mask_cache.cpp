@@ -44,7 +44,7 @@ bool isAsDescribed(const FloatGrid& mask, const FloatGrid& described) {
 }
 
 FloatGrid::ConstPtr kept(const fs::path& path, const FloatGrid& described) {
-  const auto mask = openvdb::gridConstPtrCast<FloatGrid>(readGrid(path, "mask"));
+  auto mask = openvdb::gridConstPtrCast<FloatGrid>(readGrid(path, "mask"));
   if (!mask || !isAsDescribed(*mask, described))
     throw DataError("'" + path.string() + "' holds another mask than its name says");
   return mask;
