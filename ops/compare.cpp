@@ -119,6 +119,12 @@ class Compare : public Sink {
     return "";
   }
 
+  /// A grid of a slab, or the empty one of its schema.
+  static GridConstPtr gridOf(const std::string& name, const Grids& grids, const Schema& schema) {
+    const auto found = grids.find(name);
+    return found == grids.end() ? schema.grids.at(name) : found->second;
+  }
+
   void compare(const Grids& ours, ZRange layers) {
     if (layers.empty()) return;
     const ZRange others = other_->schema().lattice.layers();
@@ -126,12 +132,9 @@ class Compare : public Sink {
     const Grids theirs = asked.empty() ? Grids() : other_->run(asked);
     for (auto& [name, finding] : findings_) {
       if (!finding.apart.empty()) continue;
-      const auto grid = [&](const Grids& grids, const Schema& schema) {
-        const auto found = grids.find(name);
-        return found == grids.end() ? schema.grids.at(name) : found->second;
-      };
-      finding.difference.add(
-          gridDifference(*grid(ours, schema_), *grid(theirs, other_->schema()), tolerance_));
+      const GridConstPtr here = gridOf(name, ours, schema_);
+      const GridConstPtr there = gridOf(name, theirs, other_->schema());
+      finding.difference.add(gridDifference(*here, *there, tolerance_));
     }
   }
 
