@@ -35,12 +35,12 @@ ZeroSetDistance::ZeroSetDistance(std::shared_ptr<const ZeroSet> surface, const L
 std::shared_ptr<const MeshDistance> ZeroSetDistance::chunk(int index) const {
   const std::lock_guard lock(mutex_);
   if (last_ && last_index_ == index) return last_;
-  // What bounds the reach of a feature in MeshDistance, and a division more.
-  const double around_mm = 2 * (backgroundMm() + lattice_.diagonalMm());
+  // More than the reach of a feature in MeshDistance.
+  const double around_mm = 2 * backgroundMm() + 3 * lattice_.diagonalMm();
   const double low_mm = index * chunk_layers * lattice_.pitch_mm.z() + lattice_.origin_mm.z();
-  auto mesh = std::make_shared<Mesh>(surface_->triangles(
-      low_mm - around_mm, low_mm + chunk_layers * lattice_.pitch_mm.z() + around_mm));
-  last_ = std::make_shared<MeshDistance>(std::move(mesh), lattice_, wide_, DistanceExtras{true});
+  const Mesh mesh = surface_->triangles(low_mm - around_mm,
+                                        low_mm + chunk_layers * lattice_.pitch_mm.z() + around_mm);
+  last_ = std::make_shared<MeshDistance>(mesh, lattice_, wide_, DistanceExtras{true});
   last_index_ = index;
   return last_;
 }
@@ -65,7 +65,7 @@ FloatGrid::Ptr ZeroSetDistance::run(ZRange core) const {
     }
     begin = range.end;
   }
-  if (!result) return MeshDistance(std::make_shared<Mesh>(), lattice_, wide_).run({0, 0}).surface;
+  if (!result) return MeshDistance(Mesh(), lattice_, wide_).run({0, 0}).surface;
   openvdb::tools::prune(result->tree());
   return result;
 }

@@ -35,7 +35,7 @@ class OffsetMap : public testing::Test {
   std::string map() {
     const std::vector<ExrChannel> channels{{"Y", false}};
     const auto bytes =
-        encodeExr(4, 3, 1, channels, [](std::uint32_t row, std::size_t, std::span<float> values) {
+        encodeExr(4, 3, {}, channels, [](std::uint32_t row, std::size_t, std::span<float> values) {
           for (std::size_t x = 0; x < 4; ++x) values[x] = static_cast<float>(4 * row + x) / 11;
         });
     const std::filesystem::path path = folder / "map.exr";
