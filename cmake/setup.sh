@@ -8,7 +8,7 @@ program_packages=(build-essential cmake ninja-build libopenvdb-dev libboost-iost
   zlib1g-dev libopenexr-dev libpng-dev libtiff-dev libminizip-dev libembree-dev libssl-dev libcli11-dev nlohmann-json3-dev python3)
 # To build and run the tests.
 test_packages=(libgtest-dev libgmock-dev libbenchmark-dev libspng-dev libopenvdb-tools
-  python3-openvdb python3-numpy python3-pil python3-skimage)
+  python3-openvdb python3-numpy python3-pil python3-skimage python3-matplotlib)
 lint_packages=(clang-14 clang-format-14 clang-tidy-14)
 
 # Says what takes long to whom is watching.

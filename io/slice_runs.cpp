@@ -305,7 +305,7 @@ class LeafStrip {
 
 openvdb::Int32Grid::Ptr gridOfRuns(std::span<const RunImage> images, const SliceFrame& frame,
                                    ZRange layers) {
-  const auto grid = openvdb::Int32Grid::create(0);
+  auto grid = openvdb::Int32Grid::create(0);
   auto target = grid->getAccessor();
   const int y_begin = frame.box.min().y() & ~(leaf_layers - 1);
   const int strip_count = (frame.box.max().y() - y_begin) / leaf_layers + 1;

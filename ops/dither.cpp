@@ -4,7 +4,9 @@
 #include <filesystem>
 
 #include "io/data_files.h"
+#include "io/mask_cache.h"
 #include "io/vdb.h"
+#include "ops/kernels/mask_tile.h"
 #include "ops/kernels/shape_dither.h"
 #include "ops/kernels/solid.h"
 #include "ops/kernels/threshold_mask.h"
@@ -36,12 +38,12 @@ ThresholdMask readMask(const std::filesystem::path& path) {
 class Dither : public Filter {
  public:
   void declare(Options& options) override {
-    options.text("mask", mask_, "blue|white|none|FILE.vdb",
-                 "Thresholds: the installed blue noise, white noise, none (plain voxels), or a "
-                 "tile of your own");
+    options.text("mask", mask_, "preset|blue|paper|white|none|FILE.vdb",
+                 "Thresholds: the installed blue noise, the paper's, white noise, none (plain "
+                 "voxels), or a tile of your own");
     options.choice("preset", preset_, {"best", "paper"},
-                   "What 'preset' stands for below: adapted, voxel and walls; or the paper's 4, "
-                   "closest and none");
+                   "What 'preset' stands for elsewhere: blue, adapted, voxel and walls; or the "
+                   "paper's mask, 4, closest and none");
     options.text("amplitude", amplitude_, "preset|adapted|N",
                  "Half of it voxel diameters peak to peak, along the normal, up to 8; or adapted "
                  "to each facet, by its normal and the spread");
@@ -53,7 +55,11 @@ class Dither : public Filter {
     options.length("spread", spread_mm_,
                    "How far the printing process blurs, a standard deviation, for the adapted "
                    "amplitude");
-    options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the white noise");
+    options.number("sigma", sigma_, 0, 16,
+                   "Another standard deviation of the blue noise, voxels, at least 0.3; made once "
+                   "and kept in the cache folder");
+    options.integer("size", size_, 0, 256, "Another period of the blue noise, voxels; likewise");
+    options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the noise");
     options.flag("displaced", displaced_,
                  "Adds the grid 'displaced', the displaced distances in mm");
   }
@@ -73,8 +79,9 @@ class Dither : public Filter {
                  : at == "foot"  ? DitherAt::foot
                                  : DitherAt::voxel;
     dither_.guarded = chosen(guard_, best ? "walls" : "none") == "walls";
-    dither_.mask = mask();
-    planAmplitude(chosen(amplitude_, best ? "adapted" : "4"));
+    const std::string mask_name = chosen(mask_, best ? "blue" : "paper");
+    dither_.mask = mask(mask_name);
+    planAmplitude(mask_name == "none" ? "0" : chosen(amplitude_, best ? "adapted" : "4"));
     checkBand(surface->background());
 
     Schema out = in;
@@ -109,9 +116,7 @@ class Dither : public Filter {
  private:
   void planAmplitude(const std::string& text) {
     dither_.adapted = nullptr;
-    if (mask_ == "none") {
-      dither_.amplitude = 0;
-    } else if (text == "adapted") {
+    if (text == "adapted") {
       if (!(spread_mm_ >= 0.01 && spread_mm_ <= 1))
         throw UsageError("--spread: " + shortestText(spread_mm_) +
                          " mm is not between 0.01 mm and 1 mm");
@@ -128,16 +133,43 @@ class Dither : public Filter {
     }
   }
 
-  [[nodiscard]] ThresholdMask mask() const {
-    if (mask_ == "none") return ThresholdMask::constant(0.5F);
-    if (mask_ == "white") return ThresholdMask::whiteNoise(static_cast<std::uint64_t>(seed_));
-    if (mask_ != "blue") return readMask(mask_);
+  [[nodiscard]] ThresholdMask mask(const std::string& name) const {
+    if (name != "blue" && name != "paper") {
+      for (const auto& [option, given] :
+           {std::pair("--sigma", sigma_ != 0), {"--size", size_ != 0}})
+        if (given)
+          throw UsageError(std::string(option) + ": of the blue noise, and --mask is '" + name +
+                           "'; blue and paper take it");
+    }
+    if (name == "none") return ThresholdMask::constant(0.5F);
+    if (name == "white") return ThresholdMask::whiteNoise(static_cast<std::uint64_t>(seed_));
+    if (name != "blue" && name != "paper") return readMask(name);
+    if (name == "paper" || sigma_ != 0 || size_ != 0 || seed_ != 1) return madeMask(name);
     const auto installed = findDataFile("masks/blue.vdb");
     if (!installed)
       throw UsageError(
           "--mask: the default mask 'masks/blue.vdb' is in no data folder; give a file or --mask "
           "white");
     return readMask(*installed);
+  }
+
+  /// Out of the user's cache, or new.
+  [[nodiscard]] ThresholdMask madeMask(const std::string& name) const {
+    VoidAndCluster settings = name == "paper" ? paperMask() : defaultMask();
+    if (sigma_ != 0) {
+      if (sigma_ < 0.3) {
+        throw UsageError("--sigma: " + shortestText(sigma_) +
+                         " is out of range; 0.3 to 16 are accepted");
+      }
+      settings.kernel.sigma = openvdb::Vec3d(sigma_);
+    }
+    if (size_ != 0) settings.size = openvdb::Coord(size_);
+    settings.seed = static_cast<std::uint64_t>(seed_);
+    const auto make = [&] {
+      return maskOf(settings, [this](double fraction) { report().progress(fraction); });
+    };
+    return ThresholdMask(*cachedMask(*emptyMask(settings), make,
+                                     [this](const std::string& text) { report().warn(text); }));
   }
 
   /// The distances must reach as far as the displacements, and the surface voxels must have theirs.
@@ -150,12 +182,14 @@ class Dither : public Filter {
                     " on this lattice needs " + text(needed_mm));
   }
 
-  std::string mask_ = "blue";
+  std::string mask_ = "preset";
   std::string preset_ = "best";
   std::string amplitude_ = "preset";
   std::string at_ = "preset";
   std::string guard_ = "preset";
   double spread_mm_ = 0.05;
+  double sigma_ = 0;
+  int size_ = 0;
   int seed_ = 1;
   bool displaced_ = false;
 

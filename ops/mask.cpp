@@ -3,9 +3,9 @@
 #include <cmath>
 #include <mutex>
 
-#include "ops/kernels/void_and_cluster.h"
+#include "ops/kernels/gradient_noise.h"
+#include "ops/kernels/mask_tile.h"
 #include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {
@@ -42,8 +42,10 @@ class Mask : public Source {
  public:
   void declare(Options& options) override {
     options.triple("size", size_, "N", "Period of the tile along x, y, z, voxels, 1 to 256");
-    options.choice("kind", kind_, {"void-and-cluster", "white", "bayer"},
-                   "How the ranks are ordered: blue noise, white noise, or ordered dither");
+    options.choice(
+        "kind", kind_, {"void-and-cluster", "white", "bayer", "gradient-noise"},
+        "How the ranks are ordered: blue noise, white noise, ordered dither, or Perlin's "
+        "noise");
     options.choice("kernel", kernel_, {"peters", "gauss", "axis-mix"},
                    "Void and cluster: the Gaussian filtered on the DFT, sampled, or mixed with its "
                    "lattice planes");
@@ -53,6 +55,7 @@ class Mask : public Source {
                    "axis-mix: standard deviation in the lattice planes, voxels");
     options.number("space-weight", space_weight_, 0, 1e6,
                    "axis-mix: weight of the Gaussian in space");
+    options.integer("cell", cell_, 2, 128, "Gradient noise: edge of its cells, voxels");
     options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the random start");
   }
 
@@ -66,6 +69,10 @@ class Mask : public Source {
       if (kind_ == "bayer" && !std::has_single_bit(static_cast<unsigned>(edge))) {
         throw UsageError("--size: " + shortestText(edge) +
                          " is no power of two, which --kind bayer needs");
+      }
+      if (kind_ == "gradient-noise" && static_cast<int>(edge) % cell_ != 0) {
+        throw UsageError("--size: " + shortestText(edge) + " is no multiple of --cell " +
+                         std::to_string(cell_));
       }
       if (!(sigma_[axis] >= 0.3 && sigma_[axis] <= 16)) {
         throw UsageError("--sigma: " + shortestText(sigma_[axis]) +
@@ -82,52 +89,25 @@ class Mask : public Source {
   [[nodiscard]] double memoryBytes() const override {
     const Coord size = tileSize();
     const double ranks = 4.0 * size.x() * size.y() * size.z();
-    return kind_ == "void-and-cluster" ? 8 * ranks : 2 * ranks;
+    return kind_ == "void-and-cluster" ? 8 * ranks
+           : kind_ == "gradient-noise" ? 5 * ranks
+                                       : 2 * ranks;
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {
     std::call_once(made_, [&] { ranks_ = makeRanks(); });
-    const Coord size = tileSize();
     const openvdb::FloatGrid::Ptr grid = emptyGrid();
-    openvdb::FloatGrid::Accessor voxels = grid->getAccessor();
-    const auto count = static_cast<double>(ranks_.size());
-    const ZRange layers = intersection(core, {0, size.z()});
-    for (int z = layers.begin; z < layers.end; ++z) {
-      const std::uint32_t* rank = ranks_.data() + static_cast<std::size_t>(z) * size.y() * size.x();
-      for (int y = 0; y < size.y(); ++y) {
-        for (int x = 0; x < size.x(); ++x)
-          voxels.setValue(Coord(x, y, z), static_cast<float>((*rank++ + 0.5) / count));
-      }
-    }
+    const ZRange layers = intersection(core, {0, tileSize().z()});
+    if (!layers.empty()) addThresholds(ranks_, layers.begin, layers.end, *grid);
     return {{"mask", grid}};
   }
 
  private:
   [[nodiscard]] Coord tileSize() const { return Coord::floor(size_); }
 
-  [[nodiscard]] openvdb::FloatGrid::Ptr emptyGrid() const {
-    openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0.0f);
-    grid->setName("mask");
-    grid->insertMeta("mask:size", openvdb::Vec3IMetadata(tileSize().asVec3i()));
-    grid->insertMeta("mask:kind", openvdb::StringMetadata(kind_));
-    if (kind_ != "bayer") grid->insertMeta("mask:seed", openvdb::Int32Metadata(seed_));
-    if (kind_ == "void-and-cluster") {
-      grid->insertMeta("mask:kernel", openvdb::StringMetadata(kernel_));
-      grid->insertMeta("mask:sigma", openvdb::Vec3DMetadata(sigma_));
-      if (kernel_ == "axis-mix") {
-        grid->insertMeta("mask:plane_sigma", openvdb::DoubleMetadata(plane_sigma_));
-        grid->insertMeta("mask:space_weight", openvdb::DoubleMetadata(space_weight_));
-      }
-    }
-    return grid;
-  }
-
-  [[nodiscard]] std::vector<std::uint32_t> makeRanks() const {
-    const Coord size = tileSize();
-    if (kind_ == "bayer") return bayerRanks(size);
-    if (kind_ == "white") return randomPermutation(size.x() * size.y() * size.z(), seed_);
+  [[nodiscard]] VoidAndCluster settings() const {
     VoidAndCluster settings;
-    settings.size = size;
+    settings.size = tileSize();
     settings.kernel.shape = kernel_ == "peters"  ? MaskKernel::Shape::peters
                             : kernel_ == "gauss" ? MaskKernel::Shape::gauss
                                                  : MaskKernel::Shape::axis_mix;
@@ -135,15 +115,32 @@ class Mask : public Source {
     settings.kernel.plane_sigma = plane_sigma_;
     settings.kernel.space_weight = space_weight_;
     settings.seed = seed_;
-    return voidAndCluster(settings, [this](double fraction) { report().progress(fraction); });
+    return settings;
+  }
+
+  [[nodiscard]] openvdb::FloatGrid::Ptr emptyGrid() const {
+    if (kind_ == "void-and-cluster") return emptyMask(settings());
+    openvdb::FloatGrid::Ptr grid = emptyMask(tileSize(), kind_);
+    if (kind_ == "gradient-noise") grid->insertMeta("mask:cell", openvdb::Int32Metadata(cell_));
+    if (kind_ != "bayer") grid->insertMeta("mask:seed", openvdb::Int32Metadata(seed_));
+    return grid;
+  }
+
+  [[nodiscard]] std::vector<std::uint32_t> makeRanks() const {
+    const Coord size = tileSize();
+    if (kind_ == "bayer") return bayerRanks(size);
+    if (kind_ == "gradient-noise") return gradientNoiseRanks(size, cell_, seed_);
+    if (kind_ == "white") return randomPermutation(size.x() * size.y() * size.z(), seed_);
+    return voidAndCluster(settings(), [this](double fraction) { report().progress(fraction); });
   }
 
   openvdb::Vec3d size_{128, 128, 128};
   std::string kind_ = "void-and-cluster";
   std::string kernel_ = "peters";
   openvdb::Vec3d sigma_{1.1, 1.1, 1.1};
-  double plane_sigma_ = 2.1;
-  double space_weight_ = 10;
+  double plane_sigma_ = 2.3;
+  double space_weight_ = 2;
+  int cell_ = 4;
   int seed_ = 1;
   mutable std::once_flag made_;
   mutable std::vector<std::uint32_t> ranks_;

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/exr.h"
@@ -12,6 +13,7 @@
 #include "io/staged_output.h"
 #include "ops/kernels/grid_surface.h"
 #include "ops/kernels/ray_picture.h"
+#include "ops/kernels/voxel_faces.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
@@ -40,6 +42,8 @@ class Render : public Sink {
     options.text("grid", grid_, "NAME",
                  "Whose surface comes down the chain: of solid its voxels, of printed, displaced "
                  "and surface a level; auto takes the furthest down the chain");
+    options.flag("blocks", blocks_,
+                 "Draws the voxels that are inside as blocks, not their surface");
     options.choice("look", look_, {look_names.begin(), look_names.end()},
                    "The light: a lamp above, a large light above, a sky all around, or a lamp so "
                    "low, from the left, that every step shows");
@@ -80,11 +84,15 @@ class Render : public Sink {
     }
     StagedOutput::check(picture, StagedOutput::Kind::file, overwrite_);
     if (!frame_file_.empty()) frame(camera_, meshOf(frame_file_), margin_);
-    if (standsAlone()) return;
+    if (standsAlone()) {
+      if (blocks_) throw UsageError("--blocks: a mesh has no voxels");
+      return;
+    }
     std::vector<std::string> there;
     for (const auto& [name, grid] : in.grids) there.push_back(name);
     name_ = chosenSurfaceGrid(there, grid_);
     surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
+    if (blocks_) faces_.emplace(in.lattice);
   }
 
   [[nodiscard]] bool isBarrier() const override { return true; }
@@ -93,13 +101,19 @@ class Render : public Sink {
     return std::vector<std::string>{name_};
   }
 
-  void write(const Slab& in) override { take(surface_->add(in.grids.at(name_), in.core)); }
+  void write(const Slab& in) override {
+    const GridConstPtr& grid = in.grids.at(name_);
+    if (!faces_) return take(surface_->add(grid, in.core));
+    int z = in.core.begin;
+    for (BitLayer& layer : surface_->insideOf(grid, in.core))
+      take(faces_->add(std::move(layer), z++));
+  }
 
   void finish() override {
     if (standsAlone()) {
       mesh_ = meshOf(files_.front());
     } else {
-      take(surface_->finish());
+      take(faces_ ? faces_->finish() : surface_->finish());
     }
     if (mesh_.triangles.empty())
       throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
@@ -162,6 +176,7 @@ class Render : public Sink {
 
   std::vector<std::string> files_;
   std::string grid_ = "auto";
+  bool blocks_ = false;
   std::string look_ = "area";
   Camera camera_{.azimuth_degrees = 30, .elevation_degrees = 35, .pixel_mm = 0.0873};
   std::string projection_ = "perspective";
@@ -175,6 +190,7 @@ class Render : public Sink {
 
   std::string name_;
   std::optional<GridSurface> surface_;
+  std::optional<VoxelFaces> faces_;
   Mesh mesh_;
 };
 

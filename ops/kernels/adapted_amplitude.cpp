@@ -51,7 +51,7 @@ class Facet {
       : normal_(normal),
         pitch_mm_(pitch_mm),
         spread_mm_(spread_mm),
-        k_D_(halfVoxelDiameter(openvdb::Vec3s(normal), pitch_mm)) {
+        half_diameter_mm_(halfVoxelDiameter(openvdb::Vec3s(normal), pitch_mm)) {
     addStairs();
     addGrain();
   }
@@ -59,7 +59,7 @@ class Facet {
   [[nodiscard]] FacetDither best() const {
     std::array<double, blurs> least;
     for (int b = 0; b < blurs; ++b) least[b] = leastOf(errors_[b]);
-    const double negligible = std::pow(negligible_share * 2 * k_D_, 2);
+    const double negligible = std::pow(negligible_share * 2 * half_diameter_mm_, 2);
 
     FacetDither best;
     double best_excess = std::numeric_limits<double>::infinity();
@@ -125,10 +125,10 @@ class Facet {
 
     std::array<double, amplitudes.size()> left{};
     for (std::size_t n = 0; n < amplitudes.size(); ++n)
-      left[n] = std::pow(sinc(amplitudes[n] * k_D_ * along), 2);
+      left[n] = std::pow(sinc(amplitudes[n] * half_diameter_mm_ * along), 2);
     std::size_t n = 0;
     for (const double checker : checkers) {
-      const double phase = pi * checker * k_D_ * along;
+      const double phase = pi * checker * half_diameter_mm_ * along;
       const double checkered = std::pow(of_checkerboard ? std::sin(phase) : std::cos(phase), 2);
       for (const double of_threshold : left) {
         for (int b = 0; b < blurs; ++b) errors_[b][n] += power[b] * checkered * of_threshold;
@@ -139,13 +139,14 @@ class Facet {
 
   void addGrain() {
     // The face that the dither decides about, seen along the normal.
-    const double face_mm2 = pitch_mm_.product() / (2 * k_D_ * faceCosine() * faceCosine());
+    const double face_mm2 =
+        pitch_mm_.product() / (2 * half_diameter_mm_ * faceCosine() * faceCosine());
     std::size_t n = 0;
     for (const double checker : checkers) {
       const double kept = blue_noise + (checkered_noise - blue_noise) * checker;
       for (const double amplitude : amplitudes) {
         // A uniform choice of width w steps has the variance w/6, averaged over its phases.
-        const double variance = kept * 4 * k_D_ * k_D_ * amplitude / 12;
+        const double variance = kept * 4 * half_diameter_mm_ * half_diameter_mm_ * amplitude / 12;
         for (int b = 0; b < blurs; ++b)
           errors_[b][n] += variance * face_mm2 / (4 * pi * blurMm(b) * blurMm(b));
         ++n;
@@ -166,7 +167,7 @@ class Facet {
   Vec3d normal_;
   Vec3d pitch_mm_;
   double spread_mm_;
-  double k_D_;
+  double half_diameter_mm_;
   std::array<Errors, blurs> errors_{};
 };
 

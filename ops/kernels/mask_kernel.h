@@ -18,8 +18,8 @@ struct MaskKernel {
   };
   Shape shape = Shape::peters;
   openvdb::Vec3d sigma{1.1, 1.1, 1.1};  ///< standard deviation along x, y, z, voxels, > 0
-  double plane_sigma = 2.1;  ///< axis_mix: standard deviation inside the planes, voxels, > 0
-  double space_weight = 10.0;  ///< axis_mix: weight of N₃; N₂ and N₃ are densities of integral 1
+  double plane_sigma = 2.3;  ///< axis_mix: standard deviation inside the planes, voxels, > 0
+  double space_weight = 2.0;  ///< axis_mix: weight of N₃; N₂ and N₃ are densities of integral 1
 };
 
 /// A mask kernel on the torus of a periodic tile: summed over all repetitions of the tile and

@@ -318,7 +318,10 @@ RayPicture RayScene::picture(const Camera& camera, Look look, int samples, std::
   // All in the scene's own coordinates.
   const Vec3d target = camera.target - rays_->centre;
   if (lighting.lamp) lighting.lamp->centre -= rays_->centre;
-  const auto [right, up, towards] = camera.axes();
+  const std::array<Vec3d, 3> axes = camera.axes();
+  const Vec3d& right = axes[0];
+  const Vec3d& up = axes[1];
+  const Vec3d& towards = axes[2];
   const double radius = 1.001 * rays_->radius_mm;
   // Beyond what rounding to float makes of a point, and far less than a voxel.
   const double lift = 2e-6 * radius;

@@ -61,9 +61,6 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// Bytes that the scene will take for each triangle, about.
-  static constexpr double bytes_per_triangle = 160;
-
   /// The picture. Depends on the mesh, the camera, the look and `samples` alone: every pixel has a
   /// pattern of its own, an Owen-scrambled Sobol sequence (Burley: "Practical Hash-based Owen
   /// Scrambling", 2020), scrambled by its place and `seed`; and where a ray meets an edge, the

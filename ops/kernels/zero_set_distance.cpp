@@ -65,7 +65,7 @@ FloatGrid::Ptr ZeroSetDistance::run(ZRange core) const {
     }
     begin = range.end;
   }
-  if (!result) return MeshDistance(Mesh(), lattice_, wide_).run({0, 0}).surface;
+  if (!result) return MeshDistance(Mesh{}, lattice_, wide_).run({0, 0}).surface;
   openvdb::tools::prune(result->tree());
   return result;
 }

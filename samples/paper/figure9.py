@@ -148,7 +148,7 @@ def rounded(table):
 def draw(shape, process, names):
     """Above what is seen, below the scores."""
     figure = plt.figure(figsize=(2.1 * (len(names) + 1), 7.6))
-    grid = figure.add_gridspec(3, len(names) + 1, height_ratios=(1, 1, 1.1), hspace=0.08, wspace=0.04)
+    grid = figure.add_gridspec(3, len(names) + 1, height_ratios=(1, 1, 1.1), hspace=0.16, wspace=0.04)
     for row, look in enumerate(("area", "staircase")):
         for column, name in enumerate(["the part", *names]):
             file = f"{shape}-front-{look}.png" if column == 0 else \

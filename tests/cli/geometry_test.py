@@ -47,7 +47,7 @@ class Geometry(ProgramTest):
         for first, second, priority in (("low", "high", "first"), ("high", "low", "second")):
             for slab in ("8", "64", "all"):
                 self.shell(f"vdbdither read {first}.vdb ! csg --union {second}.vdb --priority {priority} ! normals "
-                           f"! dither --mask white ! material-assign --parts "
+                           f"! dither --preset paper --mask white ! material-assign --parts "
                            f"{'white,black' if first == 'low' else 'black,white'} "
                            f"! slice-export out --overwrite --slab {slab}")
                 manifest = stack.check(self.folder / "out")

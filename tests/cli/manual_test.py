@@ -19,7 +19,7 @@ class Manual(ProgramTest):
 
     def test_help_all_has_a_line_for_every_verb(self):
         said = self.succeed("help", "all").decode()
-        for name in [*operators(), "printers"]:
+        for name in [*operators(), "printers", "ssim"]:
             self.assertRegex(said, rf"(?m)^{name} +\S")
 
     def test_the_committed_pages_are_those_of_the_program(self):
@@ -33,7 +33,7 @@ class Manual(ProgramTest):
     def test_every_verb_has_a_manual_page_that_man_accepts(self):
         self.succeed("docs", "man", "man")
         self.assertEqual(sorted(path.name for path in (self.folder / "man").iterdir()),
-                         sorted([f"vdbdither-{name}.1" for name in [*operators(), "printers"]] + ["vdbdither.1"]))
+                         sorted([f"vdbdither-{name}.1" for name in [*operators(), "printers", "ssim"]] + ["vdbdither.1"]))
         if not shutil.which("groff"):
             self.skipTest("groff is not installed")
         for page in (self.folder / "man").iterdir():
@@ -54,7 +54,8 @@ class Manual(ProgramTest):
         self.assertEqual(self.completed("mesh2"), ["mesh2sdf"])
         self.assertIn("slice-export", self.completed("mesh2sdf", "part.stl", "!", "sl"))
         self.assertEqual(self.completed("dither", "--disp"), ["--displaced"])
-        self.assertEqual(self.completed("read", "a.vdb", "!", "dither", "--at", ""), ["closest", "foot", "voxel"])
+        self.assertEqual(self.completed("read", "a.vdb", "!", "dither", "--at", ""),
+                         ["preset", "closest", "foot", "voxel"])
         self.assertEqual(self.completed("mesh2sdf", "part.stl", "--printer", "mim"), ["mimaki-3duj-553"])
         self.assertEqual(self.completed("help", "prin"), ["printers"])
         (self.folder / "part.stl").touch()

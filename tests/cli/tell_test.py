@@ -53,7 +53,7 @@ class Tell(ProgramTest):
         self.assertEqual(self.shell(f"vdbdither {CHAIN} | vdbdither compare <(vdbdither {CHAIN})"), b"equal\n")
 
     def test_compare_names_what_differs_and_exits_with_1(self):
-        self.succeed("run", CHAIN.replace("! dither", "! dither --mask white") + " -o other.vdb")
+        self.succeed("run", CHAIN.replace("! dither", "! dither --preset paper --mask white") + " -o other.vdb")
         done = self.run_program("compare", "part.vdb", "other.vdb", "--json")
         self.assertEqual(done.returncode, 1)
         found = {grid["name"]: grid for grid in json.loads(done.stdout)["grids"]}

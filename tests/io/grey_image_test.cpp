@@ -33,11 +33,12 @@ class GreyImageFile : public testing::Test {
   }
 
   std::filesystem::path exr(const std::vector<ExrChannel>& channels, float scale) {
-    const std::vector<std::uint8_t> bytes = encodeExr(
-        3, 2, {}, channels, [&](std::uint32_t row, std::size_t channel, std::span<float> values) {
-          for (std::size_t x = 0; x < values.size(); ++x)
-            values[x] = scale * static_cast<float>(10 * row + x + 100 * channel);
-        });
+    const std::vector<std::uint8_t> bytes =
+        encodeExr(3, 2, ExrFormat{}, channels,
+                  [&](std::uint32_t row, std::size_t channel, std::span<float> values) {
+                    for (std::size_t x = 0; x < values.size(); ++x)
+                      values[x] = scale * static_cast<float>(10 * row + x + 100 * channel);
+                  });
     std::ofstream(path, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()),
                static_cast<std::streamsize>(bytes.size()));

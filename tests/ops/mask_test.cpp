@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -35,7 +36,7 @@ FloatGrid::ConstPtr wholeMask(const std::vector<std::string>& arguments) {
 }
 
 TEST(Mask, EveryVoxelOfTheTileIsActiveAndTheValuesAreEvenlySpaced) {
-  for (const std::string kind : {"void-and-cluster", "white", "bayer"}) {
+  for (const std::string kind : {"void-and-cluster", "white", "bayer", "gradient-noise"}) {
     const FloatGrid::ConstPtr grid = wholeMask({"--size", "8,16,4", "--kind", kind});
     std::vector<float> values;
     for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel) values.push_back(*voxel);
@@ -89,8 +90,8 @@ TEST(Mask, MetadataSaysHowItWasMade) {
   EXPECT_EQ(grid->metaValue<std::string>("mask:kind"), "void-and-cluster");
   EXPECT_EQ(grid->metaValue<std::string>("mask:kernel"), "axis-mix");
   EXPECT_EQ(grid->metaValue<openvdb::Vec3d>("mask:sigma"), openvdb::Vec3d(1.5));
-  EXPECT_EQ(grid->metaValue<double>("mask:plane_sigma"), 2.1);
-  EXPECT_EQ(grid->metaValue<double>("mask:space_weight"), 10.0);
+  EXPECT_EQ(grid->metaValue<double>("mask:plane_sigma"), 2.3);
+  EXPECT_EQ(grid->metaValue<double>("mask:space_weight"), 2.0);
   EXPECT_EQ(grid->metaValue<int>("mask:seed"), 3);
   EXPECT_EQ((*wholeMask({"--size", "8", "--kind", "bayer"}))["mask:seed"], nullptr);
 }
@@ -123,6 +124,41 @@ TEST(Mask, FlatBayerIsTheClassicMatrix) {
   }
 }
 
+TEST(Mask, GradientNoiseIsSmoothWithinItsCellsAndAcrossTheBorderOfTheTile) {
+  const std::vector<std::string> arguments{"--size", "32", "--kind", "gradient-noise", "--cell"};
+  const auto step = [&](const std::string& cell, int x) {
+    std::vector<std::string> given = arguments;
+    given.push_back(cell);
+    const FloatGrid::ConstPtr grid = wholeMask(given);
+    FloatGrid::ConstAccessor voxels = grid->getConstAccessor();
+    double sum = 0;
+    for (int z = 0; z < 32; ++z) {
+      for (int y = 0; y < 32; ++y)
+        sum += std::abs(voxels.getValue({x, y, z}) - voxels.getValue({(x + 1) % 32, y, z}));
+    }
+    return sum / (32 * 32);
+  };
+  // Independent thresholds differ by 1/3 in the mean.
+  EXPECT_LT(step("16", 5), 0.1);
+  EXPECT_LT(step("16", 15), 0.1);
+  EXPECT_LT(step("16", 31), 0.1);
+  EXPECT_GT(step("2", 5), 0.15);
+}
+
+TEST(Mask, GradientNoiseDependsOnItsSeed) {
+  const auto mask = [](const char* seed) {
+    return wholeMask({"--size", "8", "--kind", "gradient-noise", "--seed", seed});
+  };
+  const auto differing = [](const FloatGrid& a, const FloatGrid& b) {
+    int count = 0;
+    for (auto voxel = a.cbeginValueOn(); voxel; ++voxel)
+      count += *voxel != b.tree().getValue(voxel.getCoord());
+    return count;
+  };
+  EXPECT_EQ(differing(*mask("4"), *mask("4")), 0);
+  EXPECT_GT(differing(*mask("4"), *mask("5")), 400);
+}
+
 TEST(Mask, ImpossibleSizesAndSigmasAreRefusedBeforeWork) {
   const auto refusal = [](const std::vector<std::string>& arguments) -> std::string {
     try {
@@ -140,6 +176,8 @@ TEST(Mask, ImpossibleSizesAndSigmasAreRefusedBeforeWork) {
             "--size: 8.5 is no period; whole numbers from 1 to 256 are");
   EXPECT_EQ(refusal({"--size", "12", "--kind", "bayer"}),
             "--size: 12 is no power of two, which --kind bayer needs");
+  EXPECT_EQ(refusal({"--size", "8,12,10", "--kind", "gradient-noise"}),
+            "--size: 10 is no multiple of --cell 4");
   EXPECT_EQ(refusal({"--sigma", "0.2"}), "--sigma: 0.2 is out of range; 0.3 to 16 are accepted");
   EXPECT_EQ(refusal({"--size", "8"}), "accepted");
 }

@@ -34,10 +34,11 @@ class OffsetMap : public testing::Test {
   /// Heights of 0 … 1 in four by three pixels.
   std::string map() {
     const std::vector<ExrChannel> channels{{"Y", false}};
-    const auto bytes =
-        encodeExr(4, 3, {}, channels, [](std::uint32_t row, std::size_t, std::span<float> values) {
-          for (std::size_t x = 0; x < 4; ++x) values[x] = static_cast<float>(4 * row + x) / 11;
-        });
+    const auto bytes = encodeExr(4, 3, ExrFormat{}, channels,
+                                 [](std::uint32_t row, std::size_t, std::span<float> values) {
+                                   for (std::size_t x = 0; x < 4; ++x)
+                                     values[x] = static_cast<float>(4 * row + x) / 11;
+                                 });
     const std::filesystem::path path = folder / "map.exr";
     std::ofstream(path, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()),

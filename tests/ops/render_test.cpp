@@ -111,6 +111,24 @@ TEST_F(Render, VoxelsAreDrawnAsTheyComeInSlabsOfAnyHeight) {
   EXPECT_EQ(pictures[2], pictures[0]);
 }
 
+TEST_F(Render, BlocksHaveNoSlopes) {
+  const Lattice lattice{{0.1, 0.1, 0.1}, {0, 0, 0}, CoordBBox(Coord(-4), Coord(30))};
+  const auto solid = BoolGrid::create(false);
+  solid->setName("solid");
+  for (int step = 0; step < 20; ++step)
+    solid->tree().sparseFill(CoordBBox(Coord(step, 0, 0), Coord(19, 9, step)), true);
+  const Schema schema = test::schemaOf(lattice, {{"solid", solid}});
+  const auto middle = [&](const std::vector<std::string>& more) {
+    Rendering(with(with({file("print.png"), "--look", "sky", "--overwrite"}, from_above), more))
+        .run(schema);
+    const Picture picture = readPicture(scratch / "print.png");
+    return picture.pixels[picture.pixels.size() / 2 + picture.width / 2] & 255;
+  };
+  // A slope of 45 degrees sees most of the sky; of a tread as wide as its riser is high a part is
+  // hidden behind the next.
+  EXPECT_GT(middle({}), middle({"--blocks"}) + 5U);
+}
+
 TEST_F(Render, AFrameMakesPicturesComparable) {
   const std::string bytes = test::binaryStl(test::boxMesh({0.5, 0.25, 0}, {1, 0.75, 0.5}));
   std::ofstream(scratch / "small.stl", std::ios::binary)
@@ -139,6 +157,8 @@ TEST_F(Render, RefusesWhatCannotBeDrawn) {
   const std::string words = "name the picture to write, and before it at most one mesh to draw";
   EXPECT_THAT(plan({"a.stl", "b.stl", "c.png"}), ThrowsMessage<UsageError>(words));
   EXPECT_THAT(plan({"a.stl", "b.jpg"}), ThrowsMessage<UsageError>("'b.jpg' is no .png or .exr"));
+  EXPECT_THAT(plan({"a.stl", file("b.png"), "--blocks"}),
+              ThrowsMessage<UsageError>("--blocks: a mesh has no voxels"));
   EXPECT_THAT(plan({"a.stl", "b.png", "--pixel", "0"}),
               ThrowsMessage<UsageError>("--pixel: must be more than 0 mm"));
   EXPECT_THAT(plan({"a.stl", "b.png", "--distance", "0"}),

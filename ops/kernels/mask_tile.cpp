@@ -1,0 +1,85 @@
+#include "ops/kernels/mask_tile.h"
+
+#include "vdbdither/openvdb.h"
+
+namespace vdbdither {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+
+namespace {
+
+constexpr const char* size_key = "mask:size";
+constexpr int generation = 1;
+
+std::string nameOf(MaskKernel::Shape shape) {
+  switch (shape) {
+    case MaskKernel::Shape::peters:
+      return "peters";
+    case MaskKernel::Shape::gauss:
+      return "gauss";
+    case MaskKernel::Shape::axis_mix:
+      return "axis-mix";
+  }
+  return "";
+}
+
+}  // namespace
+
+FloatGrid::Ptr emptyMask(const Coord& size, const std::string& kind) {
+  FloatGrid::Ptr grid = FloatGrid::create(0.0f);
+  grid->setName("mask");
+  grid->insertMeta(size_key, openvdb::Vec3IMetadata(size.asVec3i()));
+  grid->insertMeta("mask:kind", openvdb::StringMetadata(kind));
+  return grid;
+}
+
+FloatGrid::Ptr emptyMask(const VoidAndCluster& settings) {
+  FloatGrid::Ptr grid = emptyMask(settings.size, "void-and-cluster");
+  const MaskKernel& kernel = settings.kernel;
+  grid->insertMeta("mask:generation", openvdb::Int32Metadata(generation));
+  grid->insertMeta("mask:seed", openvdb::Int32Metadata(static_cast<int>(settings.seed)));
+  grid->insertMeta("mask:kernel", openvdb::StringMetadata(nameOf(kernel.shape)));
+  grid->insertMeta("mask:sigma", openvdb::Vec3DMetadata(kernel.sigma));
+  if (kernel.shape == MaskKernel::Shape::axis_mix) {
+    grid->insertMeta("mask:plane_sigma", openvdb::DoubleMetadata(kernel.plane_sigma));
+    grid->insertMeta("mask:space_weight", openvdb::DoubleMetadata(kernel.space_weight));
+  }
+  return grid;
+}
+
+void addThresholds(std::span<const std::uint32_t> ranks, int begin, int end, FloatGrid& mask) {
+  const auto size = mask.metaValue<openvdb::Vec3i>(size_key);
+  FloatGrid::Accessor voxels = mask.getAccessor();
+  const auto count = static_cast<double>(ranks.size());
+  auto rank = ranks.begin() + static_cast<std::ptrdiff_t>(begin) * size.y() * size.x();
+  for (int z = begin; z < end; ++z) {
+    for (int y = 0; y < size.y(); ++y) {
+      for (int x = 0; x < size.x(); ++x)
+        voxels.setValue(Coord(x, y, z), static_cast<float>((*rank++ + 0.5) / count));
+    }
+  }
+}
+
+FloatGrid::Ptr maskOf(const VoidAndCluster& settings,
+                      const std::function<void(double fraction)>& progress) {
+  FloatGrid::Ptr mask = emptyMask(settings);
+  addThresholds(voidAndCluster(settings, progress), 0, settings.size.z(), *mask);
+  return mask;
+}
+
+VoidAndCluster defaultMask() {
+  VoidAndCluster settings;
+  settings.size = Coord(64);
+  settings.kernel.shape = MaskKernel::Shape::axis_mix;
+  settings.kernel.sigma = openvdb::Vec3d(0.8);
+  return settings;
+}
+
+VoidAndCluster paperMask() {
+  VoidAndCluster settings;
+  settings.size = Coord(128);
+  return settings;
+}
+
+}  // namespace vdbdither
