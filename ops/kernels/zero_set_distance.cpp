@@ -35,8 +35,8 @@ ZeroSetDistance::ZeroSetDistance(std::shared_ptr<const ZeroSet> surface, const L
 std::shared_ptr<const MeshDistance> ZeroSetDistance::chunk(int index) const {
   const std::lock_guard lock(mutex_);
   if (last_ && last_index_ == index) return last_;
-  // What bounds the reach of a feature in MeshDistance, and a division more.
-  const double around_mm = 2 * (backgroundMm() + lattice_.diagonalMm());
+  // More than the reach of a feature in MeshDistance.
+  const double around_mm = 2 * backgroundMm() + 3 * lattice_.diagonalMm();
   const double low_mm = index * chunk_layers * lattice_.pitch_mm.z() + lattice_.origin_mm.z();
   const Mesh mesh = surface_->triangles(low_mm - around_mm,
                                         low_mm + chunk_layers * lattice_.pitch_mm.z() + around_mm);
