@@ -240,14 +240,15 @@ def by_program():
     for name, method in PROGRAM.items():
         table[name] = {}
         for shape in ("cube", "sphere"):
-            file = work / f"{file_name(name)}-{shape}.json"
-            if not file.exists():
-                chain(work, f"{shape}.stl", method, f"! simulate ! measure --reference {shape}.stl --report part.json --overwrite")
-                (work / "part.json").rename(file)
-            report = json.loads(file.read_text())
-            table[name][shape] = {"mean": 1000 * report["area"]["mean_mm"], "p99": 1000 * report["area"]["p99_mm"],
-                                  "bias": 1000 * report["area"]["bias_mm"], "components": report["components"]["count"],
-                                  "cavities": report["cavities"]["count"]}
+            def measure(state):
+                return f"! measure --reference {shape}.stl --report {file_name(name)}-{shape}-{state}.json --overwrite"
+            files = [work / f"{file_name(name)}-{shape}-{state}.json" for state in ("before", "after")]
+            if not all(file.exists() for file in files):
+                chain(work, f"{shape}.stl", method, measure("before"), "! simulate", measure("after"))
+            before, after = (json.loads(file.read_text()) for file in files)
+            table[name][shape] = {"mean": 1000 * after["area"]["mean_mm"], "p99": 1000 * after["area"]["p99_mm"],
+                                  "bias": 1000 * after["area"]["bias_mm"], "components": before["components"]["count"],
+                                  "cavities": before["cavities"]["count"]}
     return table
 
 
