@@ -36,16 +36,20 @@ of_default() {
   pictures "the default"
 }
 
-command -v vdbdither > /dev/null || { echo "reproduce.sh: there is no vdbdither; build it first, see README.md" >&2; exit 1; }
-mkdir -p "$work" "$result"
 [ $# -gt 0 ] || set -- figure8 figure9 readings pictures speed
 for step in "$@"; do
   case $step in
-    figure8 | figure9 | readings | pictures | speed | masks) ;;
-    default) step=of_default ;;
+    figure8 | figure9 | readings | pictures | speed | masks | default) ;;
     *) echo "reproduce.sh: there is no step '$step'; there are figure8 figure9 readings pictures speed masks default" >&2; exit 2 ;;
   esac
+done
+command -v vdbdither > /dev/null || { echo "reproduce.sh: there is no vdbdither; build it first, see README.md" >&2; exit 1; }
+mkdir -p "$work" "$result"
+for step in "$@"; do
   began=$(date +%s)
-  "$step"
+  case $step in
+    default) of_default ;;
+    *) "$step" ;;
+  esac
   echo "$step: $(($(date +%s) - began)) s"
 done
