@@ -112,9 +112,6 @@ class Refusals(ProgramTest):
         super().setUp()
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.6))
 
-    def test_no_arguments_point_to_help(self):
-        self.refuse(2, "vdbdither --help")
-
     def test_an_unknown_operator_names_the_nearest(self):
         self.refuse(2, "no operator 'normal'; did you mean 'normals'?", "mesh2sdf", "part.stl", *MIMAKI, "!", "normal")
         self.refuse(2, "did you mean 'mesh2sdf'?", "help", "mesh2sfd")
