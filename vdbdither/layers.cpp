@@ -110,9 +110,28 @@ class LayerCopy {
 
   const TreeT& source_;
   TreeT& target_;
-  openvdb::tree::ValueAccessor<TreeT> accessor_;
+  openvdb::tree::ValueAccessor<TreeT, false> accessor_;
   ZRange range_;
 };
+
+/// Whether a node, or a root, has nothing but background outside `range`.
+template <typename Node, typename Value>
+bool endsWithin(const Node& node, ZRange range, const Value& background) {
+  for (auto tile = node.cbeginValueAll(); tile; ++tile) {
+    const int begin = tile.getCoord().z();
+    if ((tile.isValueOn() || tile.getValue() != background) &&
+        !within({begin, begin + static_cast<int>(Node::ChildNodeType::DIM)}, range))
+      return false;
+  }
+  for (auto child = node.cbeginChildOn(); child; ++child) {
+    if (within(layersOf(child->getNodeBoundingBox()), range)) continue;
+    if constexpr (Node::LEVEL == 1)
+      return false;
+    else if (!endsWithin(*child, range, background))
+      return false;
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -131,6 +150,22 @@ GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted) {
     result = joined;
   });
   return result;
+}
+
+bool addLayers(GridBase& grid, ZRange own, std::span<const Layers> pieces, ZRange wanted) {
+  bool could = true;
+  visitGrid(grid, [&](const auto& typed) {
+    using GridT = std::decay_t<decltype(typed)>;
+    auto& target = static_cast<GridT&>(grid).tree();
+    could = endsWithin(target.root(), alignedToLeaves(own), target.background());
+    if (!could) return;
+    for (const Layers& piece : pieces) {
+      const ZRange range = intersection(piece.range, wanted);
+      if (!range.empty())
+        LayerCopy(static_cast<const GridT&>(*piece.grid).tree(), target, range).run();
+    }
+  });
+  return could;
 }
 
 GridConstPtr pruned(const GridConstPtr& grid) {

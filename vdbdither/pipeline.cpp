@@ -323,8 +323,8 @@ void Pipeline::plan(Watcher& watcher) {
   }
   if (standsAlone()) return;
   wanted_ = parseLayers(options_.layers, in->lattice.layers());
-  planRanges();
   planNeeds();
+  planRanges();
   planSlabs();
   checkDisk();
 }
@@ -362,7 +362,7 @@ void Pipeline::planRanges() {
                                               std::max(coming.end, stage->cores.end)};
     }
     stage->next_layer = stage->layers.begin;
-    stage->window.emplace(stage->reads(), stage->layers, stage->cores);
+    stage->window.emplace(stage->reads(), stage->layers, stage->cores, stage->handed_on);
     coming = stage->cores;
   }
 }
