@@ -146,7 +146,7 @@ bool endsWithin(const Node& node, ZRange range, const Value& background) {
     const auto look_at_tile = [&](openvdb::Index index) {
       ends &= !node.isValueMaskOn(index) && node.getTable()[index].getValue() == background;
     };
-    forEachEntry(node, outside, look_at_tile, [&](const auto& child) {
+    forEachEntry(node, outside, look_at_tile, [&]([[maybe_unused]] const auto& child) {
       if constexpr (Node::LEVEL == 1) {
         ends = false;
       } else {

@@ -10,7 +10,6 @@
 
 namespace vdbdither {
 
-using openvdb::Coord;
 using openvdb::Vec3s;
 
 namespace {
