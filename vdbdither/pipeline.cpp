@@ -342,8 +342,8 @@ void Pipeline::plan(Watcher& watcher) {
   }
   if (standsAlone()) return;
   wanted_ = parseLayers(options_.layers, in->lattice.layers());
-  planRanges();
   planNeeds();
+  planRanges();
   planSlabs();
   checkDisk();
   planWork();
@@ -399,7 +399,7 @@ void Pipeline::planRanges() {
                                               std::max(coming.end, stage->cores.end)};
     }
     stage->next_layer = stage->layers.begin;
-    stage->window.emplace(stage->reads(), stage->layers, stage->cores);
+    stage->window.emplace(stage->reads(), stage->layers, stage->cores, stage->handed_on);
     coming = stage->cores;
   }
 }
@@ -456,6 +456,7 @@ double Pipeline::expectedMemoryBytes(int slab_layers) const {
   constexpr double program_bytes = 40e6;
   double bytes = program_bytes;
   const Stage* before = nullptr;
+  Names held_before;  // by the windows of earlier stages
   for (const auto& stage : stages_) {
     bytes += stage->memoryBytes();
     const int all = stage->out().lattice.layers().size();
@@ -468,12 +469,18 @@ double Pipeline::expectedMemoryBytes(int slab_layers) const {
       const Reach reach = widest(stage->reads());
       const int window_layers =
           reach.whole || stage->isBarrier() ? all : slab_layers + reach.below + reach.above;
-      // A window holds the slabs its reach covers, and a filter's input is a copy of what it reads.
       bytes += bytesOfRows(before->out(), before->handed_on, rows(window_layers));
-      Names copied;
-      for (const Read& read : stage->reads()) copied.insert(read.grid);
-      if (reach.below + reach.above > 0)
-        bytes += bytesOfRows(before->out(), copied, rows(window_layers));
+      // What somebody else holds too is copied to be joined with its halo; the rest grows by it.
+      const int halo_layers = reach.below + reach.above;
+      if (halo_layers > 0) {
+        for (const Read& read : stage->reads()) {
+          const bool copied =
+              stage->handed_on.contains(read.grid) || held_before.contains(read.grid);
+          bytes +=
+              bytesOfRows(before->out(), {read.grid}, rows(copied ? window_layers : halo_layers));
+          held_before.insert(read.grid);
+        }
+      }
     }
     before = stage.get();
   }
