@@ -292,7 +292,7 @@ void Options::parse(std::span<const std::string> arguments, const Options& commo
   if (extras.empty()) {
     for (const Option& option : options_) {
       if (option.required && option.get().empty())
-        throw UsageError(option.name + " is missing; see --help");
+        throw UsageError("no " + option.name + " is given; see --help");
     }
     return;
   }

@@ -363,7 +363,9 @@ std::optional<double> Pipeline::expectedSeconds() const {
     if (!stage->report().expected_cpu_seconds) return std::nullopt;
     cpu_seconds += *stage->report().expected_cpu_seconds;
   }
-  return cpu_seconds / threadsOf(options_);
+  // What one thread does alone: the first of two was seen to do 70 to 75 % of the work.
+  constexpr double alone = 0.4;
+  return cpu_seconds * (alone + (1 - alone) / threadsOf(options_));
 }
 
 void Pipeline::planNeeds() {
