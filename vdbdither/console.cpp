@@ -28,6 +28,13 @@ void Console::begin(bool quiet, double box_voxels, double expected_seconds) {
   box_voxels_ = box_voxels;
   expected_seconds_ = expected_seconds;
   start_ = last_ = Clock::now();
+  // The first word of a stage may take its time.
+  if (terminal_ && expected_seconds >= 1) {
+    std::fprintf(stderr, "\r\033[K%-16s   0 %%  about %s left", "",
+                 clockText(expected_seconds).c_str());
+    std::fflush(stderr);
+    shown_ = true;
+  }
 }
 
 void Console::warn(const std::string& stage, const std::string& text) {
