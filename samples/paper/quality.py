@@ -117,7 +117,8 @@ if any("3 foot" in methods for methods in facets.values()):
     for spread in (50, 100):
         print(f"### mimaki, σ = {spread} µm, by constant: mean error, µm\n")
         shown = [t for t in tilts if not np.isnan(average(("mimaki", spread, t), "3 foot"))]
-        extra = ["triangular 2", "coverage", "4 voxel", "paper", "2 closest", "best 25", "best", "best 100"]
+        extra = ["triangular 2", "coverage", "4 closest", "4 voxel", "2 closest", "2 voxel, paper's mask",
+                 "paper", "best, paper's mask", "best 25", "best", "best 100"]
         table(["rule"] + [f"{t:g}°" for t in shown],
               [[m] + [f"{average(('mimaki', spread, t), m):.2f}" for t in shown] for m in sweep + extra])
     for measure, title in (("stairs", "residual staircase"), ("modulation", "noise modulation")):
@@ -151,7 +152,8 @@ for row in rows:
         summary["detail"].append({k: v for k, v in row.items() if k != "set"})
 METHODS = SHOWN + ["best unguarded", "2 voxel", "coverage"]
 for piece, what in (("plate", "volume_error_percent"), ("wires", "volume_error_percent"),
-                    ("comb", "components"), ("plate", "components"), ("wires", "components"),
+                    ("wires", "stroke_volume_error_percent"), ("wires", "stroke_overlap"),
+                    ("comb", "components"), ("plate", "components"), ("wires", "components"), ("plate", "tunnels"),
                     ("embossed", "stroke_volume_error_percent"), ("embossed", "stroke_overlap"),
                     ("engraved", "stroke_volume_error_percent"), ("engraved", "stroke_overlap")):
     keys = sorted(key for key in details if key[1] == piece)
@@ -163,7 +165,7 @@ for piece, what in (("plate", "volume_error_percent"), ("wires", "volume_error_p
         cells = []
         for method in METHODS:
             values = [row[what] for row in details[key].get(method, [])]
-            if what == "components":
+            if what in ("components", "tunnels"):
                 cells.append(", ".join(str(v) for v in values))
             elif what.endswith("percent"):
                 cells.append(", ".join(f"{v:+.1f}" for v in values))
