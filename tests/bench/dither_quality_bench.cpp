@@ -313,16 +313,20 @@ std::vector<Method> methodsFor(const Masks& masks, bool every) {
   return methods;
 }
 
-/// Strips of flat facets, 3.2 × 1 mm, `tilt` degrees off an axis of the lattice towards `azimuth`.
+/// Strips of flat facets, 3.2 × 1 mm, `tilt` degrees off an axis of the lattice towards `azimuth`;
+/// for every rule fewer of them.
 void facets(const Masks& masks, const std::string& only, bool every) {
-  constexpr int positions = 3;
+  const int positions = every ? 1 : 3;
+  const std::vector<double> tilts =
+      every ? std::vector{0.5, 2.0, 5.0, 10.0, 20.0, 45.0}
+            : std::vector{0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0};
   const Vec3d half(1.6, 0.5, 0);
   const auto methods = chosen(methodsFor(masks, every));
   for (const auto& [name, pitch] : latticesNamed(only)) {
     for (int a = 0; a < 3; ++a) {
       if (std::strcmp(name, "cubic") == 0 && a != 2) continue;
       for (const double azimuth : {3.0, 40.0, 87.0}) {
-        for (const double tilt : {0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0}) {
+        for (const double tilt : tilts) {
           const int b = (a + 1) % 3;
           const int c = (a + 2) % 3;
           const double t = tilt * pi / 180;
@@ -369,10 +373,10 @@ void facets(const Masks& masks, const std::string& only, bool every) {
           }
           for (std::size_t m = 0; m < methods.size(); ++m) {
             for (std::size_t s = 0; s < 2; ++s) {
-              std::cout << "{\"set\":\"facets\",\"lattice\":\"" << name << "\",\"axis\":" << a
-                        << ",\"azimuth\":" << azimuth << ",\"tilt\":" << tilt
-                        << ",\"spread\":" << 1000 * spreads_mm[s] << ",\"method\":\""
-                        << methods[m].name
+              std::cout << "{\"set\":\"" << (every ? "sweep" : "facets") << "\",\"lattice\":\""
+                        << name << "\",\"axis\":" << a << ",\"azimuth\":" << azimuth
+                        << ",\"tilt\":" << tilt << ",\"spread\":" << 1000 * spreads_mm[s]
+                        << ",\"method\":\"" << methods[m].name
                         << "\",\"diameter\":" << 2000 * halfVoxelDiameter(openvdb::Vec3s(n), pitch)
                         << ",";
               errors[m][s].print();
