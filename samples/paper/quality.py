@@ -185,7 +185,7 @@ for piece, what in (("plate", "volume_error_percent"), ("wires", "volume_error_p
 
 heights = [row for row in rows if row["set"] == "heights"]
 if heights:
-    methods = list(dict.fromkeys(row["method"] for row in heights))
+    methods = list(dict.fromkeys(SHOWN + [row["method"] for row in heights]))
     figure, axes = plt.subplots(len(methods), 2, figsize=(8, 1.9 * len(methods)))
     for row in heights:
         ax = axes[methods.index(row["method"]), 0 if row["axis"] == 2 else 1]
