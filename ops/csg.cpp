@@ -71,6 +71,8 @@ class CsgOperator : public Filter {
 
   [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
 
+  void drain() override { other_->drain(); }
+
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto surface = findGrid<FloatGrid>(in.grids, "surface");
     const ZRange there = intersection(in.core, other_->schema().lattice.layers());

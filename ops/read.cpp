@@ -30,6 +30,7 @@ class ReadOperator : public Source {
   [[nodiscard]] bool isBarrier() const override { return !reader_->isPipe(); }
   [[nodiscard]] double memoryBytes() const override { return reader_->memoryBytes(); }
   [[nodiscard]] Grids run(ZRange core) const override { return reader_->run(core); }
+  void drain() override { reader_->drain(); }
 
  private:
   /// What commas part.

@@ -1,5 +1,6 @@
 """What happens when a pipe, a file, a disk or the user lets the program down."""
 
+import os
 import random
 import signal
 import subprocess
@@ -123,6 +124,28 @@ class Stops(ProgramTest):
             self.assertEqual(process.returncode, 128 + number)
             self.assertRegex(said, r"^vdbdither .*stopped: \w+\n$")
             self.assertEqual(self.listing(), self.inputs)
+
+    def test_who_waits_for_a_pipe_can_be_stopped(self):
+        os.mkfifo(self.folder / "silent.vdb")
+        self.succeed("mesh2sdf", "part.stl", *MIMAKI, "-o", "part.vdb")
+        before = self.listing()
+        reader, writer = os.pipe()
+        self.addCleanup(os.close, writer)
+        for arguments, keywords in (
+                (("dither", "-o", "out.vdb"), {"stdin": reader}),
+                (("resample", *MIMAKI, "-o", "out.vdb"), {"stdin": reader}),
+                (("csg", "--union", "silent.vdb", "-i", "part.vdb", "-o", "out.vdb"), {}),
+                (("mesh2sdf", "tall.stl", *MIMAKI), {"stdout": writer})):
+            for number in (signal.SIGINT, signal.SIGTERM):
+                process = self.start(*arguments, **keywords)
+                time.sleep(1)
+                self.assertIsNone(process.poll(), arguments)
+                process.send_signal(number)
+                said = process.communicate(timeout=20)[1].decode()
+                self.assertEqual(process.returncode, 128 + number, (arguments, said))
+                self.assertEqual(said.count("\n"), 1, said)
+                self.assertEqual(self.listing(), before)
+        os.close(reader)
 
     def test_what_a_killed_run_left_is_cleared_by_the_next(self):
         process = self.start(*self.chain())
