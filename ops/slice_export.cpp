@@ -144,6 +144,11 @@ class SliceExport : public Sink {
                   {reinterpret_cast<const std::uint8_t*>(manifest.data()), manifest.size()});
     stack_->commit();
     stack_.reset();
+    // Some layers of a job may well be empty.
+    const bool all = ZRange{first_layer_, last_layer_ + 1} == schema_.lattice.layers();
+    if (all &&
+        std::all_of(voxels_.begin() + 1, voxels_.end(), [](auto count) { return count == 0; }))
+      report().warn("no voxel is printed; is the part thinner than a voxel, or its unit another?");
     report().count("slices", static_cast<double>(last_layer_ - first_layer_ + 1));
     for (std::size_t i = 0; i < materials_.size(); ++i) {
       report().count("voxels of " + materials_[i].name, static_cast<double>(voxels_[i + 1]));
