@@ -10,7 +10,7 @@ import time
 import unittest
 
 import meshes
-from program import MIMAKI, PROGRAM, ProgramTest
+from program import MIMAKI, PATIENCE, PROGRAM, ProgramTest
 
 
 class FullDisk(ProgramTest):
@@ -24,7 +24,7 @@ class FullDisk(ProgramTest):
         meshes.write_stl(cls.inputs / "part.stl", meshes.sphere(0.6))
         for line in (("mesh2sdf", "part.stl", *MIMAKI, "!", "normals", "!", "dither", "!", "material-assign", "-o", "part.vdb"),
                      ("mesh-export", "-i", "part.vdb", "print.ply")):
-            subprocess.run([PROGRAM, *line], cwd=cls.inputs, check=True, timeout=120)
+            subprocess.run([PROGRAM, *line], cwd=cls.inputs, check=True, timeout=120 * PATIENCE)
 
     def setUp(self):
         super().setUp()
@@ -221,7 +221,7 @@ class Killed(ProgramTest):
                 self.succeed(*small)
                 before = self.listing()
                 process = self.start("read", "large.vdb", "!", *sink, "--overwrite")
-                deadline = time.monotonic() + 60
+                deadline = time.monotonic() + 60 * PATIENCE
                 while not self.hidden():
                     self.assertIsNone(process.poll())
                     self.assertLess(time.monotonic(), deadline)

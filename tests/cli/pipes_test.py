@@ -7,7 +7,7 @@ import time
 import unittest
 
 import meshes
-from program import MIMAKI, ProgramTest
+from program import MIMAKI, PATIENCE, ProgramTest
 
 
 class Damage(ProgramTest):
@@ -108,7 +108,7 @@ class Stops(ProgramTest):
 
     def wait_for_slices(self, process):
         """Waits until a stack is begun."""
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 60 * PATIENCE
         while not any(path.suffix == ".png" for path in self.folder.rglob("*")):
             self.assertIsNone(process.poll())
             self.assertLess(time.monotonic(), deadline)
@@ -140,7 +140,7 @@ class Stops(ProgramTest):
                 time.sleep(1)
                 self.assertIsNone(process.poll(), arguments)
                 process.send_signal(number)
-                said = process.communicate(timeout=20)[1].decode()
+                said = process.communicate(timeout=20 * PATIENCE)[1].decode()
                 self.assertEqual(process.returncode, 128 + number, (arguments, said))
                 self.assertEqual(said.count("\n"), 1, said)
                 self.assertEqual(self.listing(), before)
@@ -182,7 +182,7 @@ class Stops(ProgramTest):
         self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "out")
         before = self.listing()
         process = self.start(*self.chain(), "--overwrite")
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 60 * PATIENCE
         while self.listing() == before:
             self.assertLess(time.monotonic(), deadline)
         process.send_signal(signal.SIGINT)

@@ -250,7 +250,7 @@ TEST(SliceExport, AStackWithoutAVoxelIsTold) {
   empty.grids = empty.schema.grids;
   int number = 0;
   for (const auto& [job, warnings] : {std::pair{smallJob(), 0}, std::pair{empty, 1}}) {
-    Export to({(folder.path() / std::to_string(number++)).string()});
+    Export to({folder / std::to_string(number++)});
     test::Listener listener;
     to.made->setReporter(&listener);
     to.run(job);
