@@ -222,18 +222,20 @@ class SliceExport : public Sink {
         source_ == "material"
             ? sliceRuns(*findGrid<openvdb::Int32Grid>(in.grids, source_), frame_, layers)
             : sliceRuns(*findGrid<openvdb::BoolGrid>(in.grids, source_), frame_, layers);
-    int next = layers.begin;
-    using Layer = std::shared_ptr<LayerOutput>;
+    // They are kept here, for TBB forgets what is on its way when one of the steps fails.
+    std::vector<LayerOutput> outputs(static_cast<std::size_t>(layers.size()));
+    std::size_t next = 0;
+    using Layer = LayerOutput*;
     const auto take = [&](tbb::flow_control& control) -> Layer {
-      if (next == layers.end) {
+      if (next == outputs.size()) {
         control.stop();
         return nullptr;
       }
-      auto layer = std::make_shared<LayerOutput>();
-      layer->z = next;
-      layer->image = std::move(images[next - layers.begin]);
+      LayerOutput& layer = outputs[next];
+      layer.z = layers.begin + static_cast<int>(next);
+      layer.image = std::move(images[next]);
       ++next;
-      return layer;
+      return &layer;
     };
     const auto encode = [&](Layer layer) {
       countVoxels(*layer);
@@ -245,7 +247,10 @@ class SliceExport : public Sink {
       }
       return layer;
     };
-    const auto store = [&](const Layer& layer) { storeLayer(*layer); };
+    const auto store = [&](Layer layer) {
+      storeLayer(*layer);
+      *layer = {};
+    };
     tbb::parallel_pipeline(
         std::size_t{2} * tbb::this_task_arena::max_concurrency(),
         tbb::make_filter<void, Layer>(tbb::filter_mode::serial_in_order, take) &
