@@ -38,7 +38,7 @@ class Printers : public Command {
     }
     if (action_ != "show" && action_ != "check")
       throw UsageError("action: '" + action_ + "' is none of list, show, check");
-    if (printer_.empty()) throw UsageError("printer is missing; see --help");
+    if (printer_.empty()) throw UsageError("no printer is given; see --help");
     print(action_ == "show" ? show(readPrinterProfile(printer_)) : check());
   }
 

@@ -125,6 +125,8 @@ Mesh parseByContent(const MeshFile& file) {
     return parseObj(file);
   }
   if (!is_text && equalsIgnoringCase(extension, ".stl")) return parseBinaryStl(file);
+  if (equalsIgnoringCase(extension, ".vdb"))
+    file.refuse("a .vdb is no mesh; read takes one of this lattice, resample any other");
   file.refuse("not a mesh in a format that is read; export STL, OBJ or PLY");
 }
 

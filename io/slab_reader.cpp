@@ -11,6 +11,7 @@
 #include "vdbdither/errors.h"
 #include "vdbdither/layers.h"
 #include "vdbdither/openvdb.h"
+#include "vdbdither/visit_grid.h"
 
 namespace vdbdither {
 
@@ -30,6 +31,19 @@ void keepNamed(Grids& grids, const std::vector<std::string>& names) {
     kept.insert(*found);
   }
   grids = std::move(kept);
+}
+
+/// How many leaves each row of eight layers has, of the grid that has the most there.
+std::map<int, double> leavesOfRows(const Grids& grids) {
+  std::map<int, double> most;
+  for (const auto& [name, grid] : grids) {
+    std::map<int, double> rows;
+    visitGrid(*grid, [&](const auto& typed) {
+      for (auto leaf = typed.tree().cbeginLeaf(); leaf; ++leaf) ++rows[leaf->origin().z()];
+    });
+    for (const auto& [z, leaves] : rows) most[z] = std::max(most[z], leaves);
+  }
+  return most;
 }
 
 }  // namespace
@@ -70,6 +84,10 @@ void SlabReader::openFile(const std::vector<std::string>& names) {
   ZRange held{std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};
   if (const auto some = schema_.metadata.extract(layers_key)) {
     std::istringstream(some.mapped()) >> held.begin >> held.end;
+  }
+  for (const auto& [z, leaves] : leavesOfRows(contents.grids)) {
+    schema_.leaves += leaves;
+    schema_.leaves_per_row = std::max(schema_.leaves_per_row, leaves);
   }
   slabs_.push_back({held, held, std::move(contents.grids)});
 }

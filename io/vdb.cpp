@@ -154,6 +154,13 @@ std::ifstream openArchive(const std::filesystem::path& path) {
   if (!file.read(head.data(), static_cast<std::streamsize>(head.size()))) {
     throw DataError(quoted(path) + " is not a readable VDB archive: it is too short");
   }
+  std::int32_t magic = 0;
+  std::memcpy(&magic, head.data(), sizeof magic);
+  if (magic != openvdb::OPENVDB_MAGIC) {
+    throw DataError(quoted(path) +
+                    " is not a readable VDB archive: it is a file of another kind; meshes come in "
+                    "by mesh2sdf, stacks of slices by slice-import");
+  }
   file.clear();
   file.seekg(0);
   if (const auto length = statedLength(head);
@@ -198,25 +205,32 @@ CoordBBox parseBox(const std::string& text, const std::string& where) {
   return box;
 }
 
-/// Pitch and origin of a grid whose transform only scales and shifts.
-Lattice latticeOf(const GridBase& grid, const std::string& where) {
-  const auto& map = *grid.transform().baseMap();
-  const openvdb::Mat4d matrix = map.getAffineMap()->getMat4();
+/// Pitch and origin of a grid whose transform must only scale and shift.
+Lattice plainLatticeOf(const GridBase& grid, const std::string& where) {
+  if (const auto lattice = latticeOf(grid)) return *lattice;
+  const std::string refused = where + ": grid '" + grid.getName() + "' ";
+  if (!grid.transform().isLinear())
+    throw DataError(refused + "lies in a frustum; resample it in the tool that it comes from");
+  throw DataError(refused + "is turned or sheared; resample --grid " + grid.getName() +
+                  " brings numbers onto the printer's lattice");
+}
+
+}  // namespace
+
+std::optional<Lattice> latticeOf(const GridBase& grid) {
+  if (!grid.transform().isLinear()) return std::nullopt;
+  const openvdb::Mat4d matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
   Lattice lattice;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
-      if ((row == column) ? !(matrix(row, column) > 0) : matrix(row, column) != 0) {
-        throw DataError(where + ": grid '" + grid.getName() +
-                        "' is turned or sheared; bring it onto the printer's lattice first");
-      }
+      if ((row == column) ? !(matrix(row, column) > 0) : matrix(row, column) != 0)
+        return std::nullopt;
     }
     lattice.pitch_mm[row] = matrix(row, row);
     lattice.origin_mm[row] = matrix(3, row);
   }
   return lattice;
 }
-
-}  // namespace
 
 void ArchiveDigest::update(const char* bytes, std::size_t size) {
   const std::size_t uuid_begin = std::clamp(uuid_offset, size_, size_ + size) - size_;
@@ -334,13 +348,14 @@ Schema schemaOf(const VdbContents& contents, const std::string& where) {
   Schema schema;
   schema.metadata = contents.metadata;
   const GridBase& first = *contents.grids.begin()->second;
-  schema.lattice = latticeOf(first, where);
+  schema.lattice = plainLatticeOf(first, where);
   for (const auto& [name, grid] : contents.grids) {
-    const Lattice lattice = latticeOf(*grid, where);
+    const Lattice lattice = plainLatticeOf(*grid, where);
     if (lattice.pitch_mm != schema.lattice.pitch_mm ||
         lattice.origin_mm != schema.lattice.origin_mm) {
       throw DataError(where + ": grids '" + first.getName() + "' and '" + name +
-                      "' lie on different lattices");
+                      "' lie on different lattices; take some with read --grids NAME, and info "
+                      "says what each is good for");
     }
     schema.grids[name] = grid->copyGridWithNewTree();
   }

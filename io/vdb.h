@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iosfwd>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "vdbdither/schema.h"
@@ -48,6 +49,10 @@ GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name
 
 /// The archive as bytes, digest included.
 std::string archiveBytes(const VdbContents& contents, VdbCodec codec);
+
+/// Pitch and origin of a grid whose transform only scales and shifts, without a box; nothing of
+/// one that is turned, mirrored, sheared or a frustum.
+std::optional<Lattice> latticeOf(const openvdb::GridBase& grid);
 
 /// The lattice, printer and history that metadata and transforms state. Files of other tools get
 /// the lattice of their first grid and the box of their active voxels. Throws DataError where a

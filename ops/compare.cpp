@@ -6,6 +6,7 @@
 
 #include "io/slab_reader.h"
 #include "ops/kernels/grid_difference.h"
+#include "vdbdither/comma_list.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
@@ -44,8 +45,7 @@ class Compare : public Sink {
         for (const auto& [name, grid] : *grids) names.push_back(name);
       }
     } else {
-      std::istringstream text(names_);
-      for (std::string name; std::getline(text, name, ',');) names.push_back(name);
+      names = commaList(names_);
     }
     for (const std::string& name : names) {
       Finding& finding = findings_[name];

@@ -55,6 +55,11 @@ class CsgOperator : public Filter {
     out.grids["surface"] = emptyCombined(*surface, *empty_);
     for (const char* name : {"N", "closest"}) out.grids.erase(name);
     out.leaves_per_row += second.leaves_per_row;
+    if (in.leaves == 0 || second.leaves == 0) {
+      out.leaves = 0;
+    } else {
+      out.leaves += second.leaves;
+    }
     if (operation_ == Csg::unite) {
       out.lattice.box.expand(second.lattice.box);
       planParts(in, second, path);
@@ -72,6 +77,8 @@ class CsgOperator : public Filter {
   [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
 
   void drain() override { other_->drain(); }
+
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 14}; }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto surface = findGrid<FloatGrid>(in.grids, "surface");

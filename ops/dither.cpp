@@ -102,6 +102,11 @@ class Dither : public Filter {
     return static_cast<double>(dither_.mask.bytes());
   }
 
+  [[nodiscard]] std::optional<Work> work() const override {
+    const double own_normals = has_normals_ || dither_.amplitude == 0 ? 0 : 3;
+    return Work{.us_per_leaf = (dither_.amplitude == 0 ? 2 : 6) + own_normals};
+  }
+
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto surface = findGrid<FloatGrid>(in.grids, "surface");
     const auto normals =

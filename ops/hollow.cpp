@@ -55,6 +55,8 @@ class Hollow : public Filter {
 
   [[nodiscard]] std::vector<Read> reads() const override { return {{"surface", Reach::point()}}; }
 
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 6}; }
+
   [[nodiscard]] Grids run(const Slab& in) const override {
     return {{"surface", hollowed(*findGrid<FloatGrid>(in.grids, "surface"), lattice_, thickness_mm_,
                                  drains_, background_mm_, in.core)}};

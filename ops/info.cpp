@@ -1,15 +1,20 @@
+#include <algorithm>
 #include <array>
 #include <cstdio>
+#include <filesystem>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
 
 #include "io/material_table.h"
 #include "io/printer_profile.h"
+#include "io/vdb.h"
 #include "ops/kernels/grid_summary.h"
+#include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
 #include "vdbdither/run_options.h"
+#include "vdbdither/visit_grid.h"
 
 namespace vdbdither {
 
@@ -35,7 +40,71 @@ std::string tripleText(const Vector& v, const char* separator = " ") {
   return shortText(v[0]) + separator + shortText(v[1]) + separator + shortText(v[2]);
 }
 
-/// Says what there is: grids, lattice, ranges, materials, history.
+/// Numbers in a row with blanks between them.
+std::string rowText(const openvdb::Mat4d& matrix, int column) {
+  std::string text;
+  for (int row = 0; row < 4; ++row) text += (row > 0 ? " " : "") + shortText(matrix(row, column));
+  return text;
+}
+
+bool isVector(const GridBase& grid) { return grid.valueType().starts_with("vec3"); }
+bool isOfNumbers(const GridBase& grid) {
+  return grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>();
+}
+bool isCarried(const GridBase& grid) {
+  return grid.apply<CarriedGrids>([](const auto&) {});
+}
+/// Whether its values lie between two that are worth telling.
+bool hasRange(const GridBase& grid) {
+  return isCarried(grid) && !grid.isType<openvdb::BoolGrid>() && !grid.isType<openvdb::MaskGrid>();
+}
+
+/// Whether all grids lie on one lattice, as those of a job do.
+bool isJob(const Grids& grids) {
+  std::optional<Lattice> first;
+  for (const auto& [name, grid] : grids) {
+    const std::optional<Lattice> lattice = latticeOf(*grid);
+    if (!lattice || !isCarried(*grid)) return false;
+    if (!first) first = lattice;
+    if (lattice->pitch_mm != first->pitch_mm || lattice->origin_mm != first->origin_mm)
+      return false;
+  }
+  return true;
+}
+
+/// What of vdbdither takes a grid of a file from elsewhere; none, and why, where nothing does.
+struct Takers {
+  std::vector<std::string> commands;
+  std::string why_not;
+};
+
+Takers takersOf(const GridBase& grid, const std::string& path, const std::string& name) {
+  if (!isCarried(grid))
+    return {{}, "no operator takes " + grid.type() + "; make a level set of it first"};
+  if (!grid.transform().isLinear())
+    return {{}, "no operator takes a frustum; resample it in the tool that it comes from"};
+  Takers takers;
+  const auto word = [](const std::string& text) {
+    const bool plain = text.find_first_not_of(
+                           "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-/") ==
+                       std::string::npos;
+    return plain && !text.empty() ? text : "'" + text + "'";
+  };
+  if (isOfNumbers(grid))
+    takers.commands.push_back("resample " + word(path) + " --grid " + word(name) +
+                              " --printer NAME");
+  if (latticeOf(grid)) {
+    takers.commands.push_back("read " + word(path) + " --grids " + word(name));
+  } else if (takers.commands.empty()) {
+    takers.why_not =
+        "only numbers (float, double) are brought from a turned lattice onto a "
+        "printer's, by resample";
+  }
+  return takers;
+}
+
+/// Says what there is: grids, lattice, ranges, materials, history. Of a file that is no job's it
+/// says it grid by grid.
 class Info : public Sink {
  public:
   void declare(Options& options) override {
@@ -43,12 +112,21 @@ class Info : public Sink {
     options.flag("json", json_, "Say it as JSON");
   }
 
-  [[nodiscard]] std::string inputFile() const override { return path_; }
+  [[nodiscard]] std::string inputFile() const override { return standsAlone() ? "" : path_; }
+
+  /// A file is looked into as it is: `read` would refuse one that is no job's.
+  [[nodiscard]] bool standsAlone() const override {
+    std::error_code none;
+    return std::filesystem::is_regular_file(path_, none);
+  }
 
   void plan(const Schema& in) override {
+    if (standsAlone()) return;
     schema_ = in;
     for (const auto& [name, grid] : in.grids) summaries_[name];
   }
+
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 2}; }
 
   void write(const Slab& in) override {
     for (auto& [name, summary] : summaries_) {
@@ -58,9 +136,88 @@ class Info : public Sink {
     layers_ += in.core.size();
   }
 
-  void finish() override { report().print(json_ ? jsonText() : plainText()); }
+  void finish() override {
+    VdbContents contents;
+    if (standsAlone()) {
+      contents = readVdb(path_);
+      if (contents.grids.empty()) throw DataError("'" + path_ + "' holds no grid");
+      if (!isJob(contents.grids)) return tellGrids(contents.grids);
+      takeAll(contents);
+    }
+    report().print(json_ ? jsonText() : plainText());
+  }
 
  private:
+  /// What would have come by slabs.
+  void takeAll(const VdbContents& contents) {
+    schema_ = schemaOf(contents, "'" + path_ + "'");
+    for (const auto& [name, grid] : contents.grids) summaries_[name] = gridSummary(*grid);
+    layers_ = schema_.lattice.layers().size();
+    if (const auto some = schema_.metadata.extract(layers_key)) {
+      ZRange held;
+      std::istringstream(some.mapped()) >> held.begin >> held.end;
+      layers_ = held.size();
+    }
+  }
+
+  void tellGrids(const Grids& grids) {
+    ordered_json json;
+    std::ostringstream text;
+    if (grids.size() > 1) text << "the grids lie on no common lattice; each by itself:\n";
+    json["grids"] = ordered_json::array();
+    for (const auto& [name, grid] : grids) {
+      GridSummary summary;
+      if (isCarried(*grid)) {
+        summary = gridSummary(*grid);
+      } else {
+        summary.active_voxels = grid->activeVoxelCount();
+        summary.box = grid->evalActiveVoxelBoundingBox();
+        summary.leaf_bytes = grid->memUsage();
+      }
+      ordered_json entry = gridJson(name, *grid, summary);
+      gridText(text, name, *grid, summary);
+      tellPlace(*grid, entry, text);
+      const Takers takers = takersOf(*grid, path_, name);
+      for (const std::string& command : takers.commands)
+        text << "          vdbdither " << command << "\n";
+      entry["takers"] = takers.commands;
+      if (!takers.why_not.empty()) {
+        text << "          " << takers.why_not << "\n";
+        entry["why_not"] = takers.why_not;
+      }
+      json["grids"].push_back(std::move(entry));
+    }
+    report().print(json_ ? json.dump() + "\n" : text.str());
+  }
+
+  /// Where the voxels of a grid lie.
+  static void tellPlace(const GridBase& grid, ordered_json& entry, std::ostringstream& text) {
+    const openvdb::math::Transform& transform = grid.transform();
+    const char* margin = "          ";
+    entry["voxel_size"] = triple(transform.voxelSize());
+    text << margin << "voxels of " << tripleText(transform.voxelSize(), " x ");
+    if (const std::optional<Lattice> lattice = latticeOf(grid)) {
+      entry["place"] = "plain";
+      entry["origin"] = triple(lattice->origin_mm);
+      if (lattice->origin_mm != openvdb::Vec3d(0.0))
+        text << " from " << tripleText(lattice->origin_mm);
+      text << "\n";
+    } else if (transform.isLinear()) {
+      entry["place"] = "affine";
+      entry["matrix"] = ordered_json::array();
+      const openvdb::Mat4d matrix = transform.baseMap()->getAffineMap()->getMat4();
+      text << ", turned, mirrored or sheared: x y z of index i j k are\n";
+      for (int column = 0; column < 3; ++column) {
+        text << margin << "  " << rowText(matrix, column) << "\n";
+        entry["matrix"].push_back(
+            {matrix(0, column), matrix(1, column), matrix(2, column), matrix(3, column)});
+      }
+    } else {
+      entry["place"] = "frustum";
+      text << " in the middle of a frustum\n";
+    }
+  }
+
   [[nodiscard]] std::string metadata(std::string_view key) const {
     const auto found = schema_.metadata.find(key);
     return found == schema_.metadata.end() ? "" : found->second;
@@ -86,11 +243,6 @@ class Info : public Sink {
     return GridBase::gridClassToString(grid.getGridClass());
   }
 
-  static bool isVector(const GridBase& grid) { return grid.valueType().starts_with("vec3"); }
-  static bool isSet(const GridBase& grid) {
-    return grid.valueType() == "bool" || grid.valueType() == "mask";
-  }
-
   [[nodiscard]] std::string jsonText() const {
     ordered_json json;
     const Lattice& lattice = schema_.lattice;
@@ -103,38 +255,42 @@ class Info : public Sink {
     json["layers"] = layers_;
     json["grids"] = ordered_json::array();
     for (const auto& [name, summary] : summaries_) {
-      const GridBase& grid = *schema_.grids.at(name);
-      ordered_json entry = {{"name", name},
-                            {"type", grid.valueType()},
-                            {"class", className(grid)},
-                            {"active_voxels", summary.active_voxels},
-                            {"leaves", summary.leaves},
-                            {"leaf_bytes", summary.leaf_bytes}};
-      if (isVector(grid)) entry["vector_type"] = GridBase::vecTypeToString(grid.getVectorType());
-      if (summary.active_voxels > 0) {
-        entry["min"] = triple(summary.box.min());
-        entry["max"] = triple(summary.box.max());
-        if (isVector(grid)) {
-          entry["least"] = triple(summary.least);
-          entry["greatest"] = triple(summary.greatest);
-        } else if (!isSet(grid)) {
-          entry["least"] = summary.least[0];
-          entry["greatest"] = summary.greatest[0];
-        }
-      }
-      if (name == "material") {
-        entry["materials"] = ordered_json::array();
-        for (const auto& [value, voxels] : summary.counts) {
-          entry["materials"].push_back(
-              {{"index", value}, {"name", materialName(value)}, {"voxels", voxels}});
-        }
-      }
-      json["grids"].push_back(std::move(entry));
+      json["grids"].push_back(gridJson(name, *schema_.grids.at(name), summary));
     }
     const ordered_json printer = ordered_json::parse(metadata("vdbdither:printer"), nullptr, false);
     if (!printer.is_discarded()) json["printer"] = printer;
     json["history"] = history();
     return json.dump() + "\n";
+  }
+
+  [[nodiscard]] ordered_json gridJson(const std::string& name, const GridBase& grid,
+                                      const GridSummary& summary) const {
+    ordered_json entry = {{"name", name},
+                          {"type", grid.valueType()},
+                          {"class", className(grid)},
+                          {"active_voxels", summary.active_voxels},
+                          {"leaves", summary.leaves},
+                          {"leaf_bytes", summary.leaf_bytes}};
+    if (isVector(grid)) entry["vector_type"] = GridBase::vecTypeToString(grid.getVectorType());
+    if (summary.active_voxels > 0) {
+      entry["min"] = triple(summary.box.min());
+      entry["max"] = triple(summary.box.max());
+      if (hasRange(grid) && isVector(grid)) {
+        entry["least"] = triple(summary.least);
+        entry["greatest"] = triple(summary.greatest);
+      } else if (hasRange(grid)) {
+        entry["least"] = summary.least[0];
+        entry["greatest"] = summary.greatest[0];
+      }
+    }
+    if (name == "material") {
+      entry["materials"] = ordered_json::array();
+      for (const auto& [value, voxels] : summary.counts) {
+        entry["materials"].push_back(
+            {{"index", value}, {"name", materialName(value)}, {"voxels", voxels}});
+      }
+    }
+    return entry;
   }
 
   [[nodiscard]] std::string plainText() const {
@@ -155,7 +311,8 @@ class Info : public Sink {
       const PrinterProfile profile = printerProfileFromJson(printer);
       text << "printer   " << profile.name << ", " << profile.title << "\n";
     }
-    for (const auto& [name, summary] : summaries_) gridText(text, name, summary);
+    for (const auto& [name, summary] : summaries_)
+      gridText(text, name, *schema_.grids.at(name), summary);
     const char* head = "history   ";
     for (const std::string& line : history()) {
       text << head << line << "\n";
@@ -164,9 +321,8 @@ class Info : public Sink {
     return text.str();
   }
 
-  void gridText(std::ostringstream& text, const std::string& name,
+  void gridText(std::ostringstream& text, const std::string& name, const GridBase& grid,
                 const GridSummary& summary) const {
-    const GridBase& grid = *schema_.grids.at(name);
     text << name << std::string(name.size() < 9 ? 10 - name.size() : 1, ' ') << grid.valueType();
     if (grid.getGridClass() != openvdb::GRID_UNKNOWN) text << ", " << className(grid);
     if (isVector(grid) && grid.getVectorType() != openvdb::VEC_INVARIANT)
@@ -174,16 +330,17 @@ class Info : public Sink {
     text << ": " << summary.active_voxels << " voxels";
     if (summary.active_voxels > 0) {
       text << " from " << tripleText(summary.box.min()) << " to " << tripleText(summary.box.max());
-      if (isVector(grid)) {
+      if (hasRange(grid) && isVector(grid)) {
         text << ", values (" << tripleText(summary.least) << ") to ("
              << tripleText(summary.greatest) << ")";
-      } else if (!isSet(grid)) {
+      } else if (hasRange(grid)) {
         text << ", values " << shortText(summary.least[0]) << " to "
              << shortText(summary.greatest[0]);
       }
     }
-    text << ", " << bytesText(static_cast<double>(summary.leaf_bytes)) << " in " << summary.leaves
-         << " leaves\n";
+    text << ", " << bytesText(static_cast<double>(summary.leaf_bytes));
+    if (isCarried(grid)) text << " in " << summary.leaves << " leaves";
+    text << "\n";
     if (name != "material") return;
     for (const auto& [value, voxels] : summary.counts) {
       const std::string known = materialName(value);

@@ -8,6 +8,7 @@
 #include "io/material_table.h"
 #include "io/printer_profile.h"
 #include "ops/kernels/depth_bands.h"
+#include "vdbdither/comma_list.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/find_grid.h"
 #include "vdbdither/openvdb.h"
@@ -26,8 +27,7 @@ using openvdb::Int32Tree;
 /// The entries of a list; commas between the numbers of a colour do not part them.
 std::vector<std::string> entriesOf(const std::string& text) {
   std::vector<std::string> entries;
-  std::stringstream stream(text);
-  for (std::string part; std::getline(stream, part, ',');) {
+  for (const std::string& part : commaList(text)) {
     const bool number = !part.empty() && std::all_of(part.begin(), part.end(),
                                                      [](char c) { return c >= '0' && c <= '9'; });
     if (number && !entries.empty() && entries.back().find('=') != std::string::npos) {
@@ -80,6 +80,10 @@ class MaterialAssign : public Filter {
         {"solid", Reach::stencil(depthReach(bands_, lattice_.pitch_mm.z()))}};
     if (!parts_.empty()) reads.push_back({"part", Reach::point()});
     return reads;
+  }
+
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_leaf = bands_.empty() ? 1.0 : 9.0};
   }
 
   [[nodiscard]] Grids run(const Slab& in) const override {

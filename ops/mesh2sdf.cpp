@@ -66,6 +66,7 @@ class MeshToSdf : public Source {
     const Vec3d pitch_mm = targetPitchMm(printer_, pitch_, schema);
     band_ = bandFrom(band_text_);
     held_band_mm_ = band_.leastMm(pitch_mm);
+    if (fit_mm_ < 0) throw UsageError("--fit: " + shortestText(fit_mm_) + " mm is below zero");
     Mesh mesh = readMeshes();
     place(mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
     questionSize(mesh, schema);
@@ -73,6 +74,7 @@ class MeshToSdf : public Source {
     const Lattice& lattice = schema.lattice;
     planParts(mesh, lattice);
     const SwallowedWalls walls = repair(mesh);
+    triangles_ = static_cast<double>(mesh.triangles.size());
     const std::vector<double> leaves = leavesOfRows(mesh, lattice);
     schema.leaves_per_row = *std::max_element(leaves.begin(), leaves.end());
     schema.leaves = std::accumulate(leaves.begin(), leaves.end(), 0.0);
@@ -85,6 +87,12 @@ class MeshToSdf : public Source {
     double bytes = field_->memoryBytes();
     for (const MeshDistance& part : parts_) bytes += part.memoryBytes();
     return bytes;
+  }
+
+  [[nodiscard]] std::optional<Work> work() const override {
+    const double per_leaf = 2.4 + (extras_.normals ? 8 : 0) + (extras_.closest ? 2 : 0);
+    const double fields = parts_.empty() ? 1 : 2;
+    return Work{.us_per_leaf = fields * per_leaf, .seconds = 1e-6 * fields * triangles_};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {
@@ -284,6 +292,7 @@ class MeshToSdf : public Source {
   Band band_;
   double held_band_mm_ = 0;
   std::unique_ptr<MeshDistance> field_;
+  double triangles_ = 0;
   std::vector<std::size_t> triangle_counts_;  ///< of every file
   std::vector<MeshDistance> parts_;           ///< of every file, where there are several
 };

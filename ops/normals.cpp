@@ -26,6 +26,10 @@ class Normals : public Filter {
     return given_ ? std::vector<Read>{} : std::vector<Read>{{"surface", Reach::stencil(1)}};
   }
 
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_leaf = given_ ? 0 : 4.7};
+  }
+
   [[nodiscard]] Grids run(const Slab& in) const override {
     if (given_) return {};
     return {{"N", outwardNormals(*findGrid<FloatGrid>(in.grids, "surface"), pitch_mm_, in.core,

@@ -1,7 +1,9 @@
 #include <unistd.h>
 
 #include "io/slab_reader.h"
+#include "vdbdither/comma_list.h"
 #include "vdbdither/errors.h"
+#include "vdbdither/layers.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {
@@ -23,27 +25,24 @@ class ReadOperator : public Source {
       throw UsageError(
           "nothing is piped in; name a source first (mesh2sdf part.stl), or a file: -i part.vdb");
     }
-    reader_ = std::make_unique<SlabReader>(path_, words(names_));
+    reader_ = std::make_unique<SlabReader>(
+        path_, names_.empty() ? std::vector<std::string>{} : commaList(names_));
     return reader_->schema();
   }
 
   [[nodiscard]] bool isBarrier() const override { return !reader_->isPipe(); }
   [[nodiscard]] double memoryBytes() const override { return reader_->memoryBytes(); }
+  [[nodiscard]] std::optional<Work> work() const override {
+    constexpr double us_per_byte = 1.4e-3;
+    double bytes = 0;
+    for (const auto& [name, grid] : reader_->schema().grids) bytes += leafBytes(grid);
+    return Work{.us_per_leaf = us_per_byte * bytes};
+  }
+
   [[nodiscard]] Grids run(ZRange core) const override { return reader_->run(core); }
   void drain() override { reader_->drain(); }
 
  private:
-  /// What commas part.
-  static std::vector<std::string> words(const std::string& text) {
-    std::vector<std::string> words;
-    for (std::size_t begin = 0; begin < text.size();) {
-      const std::size_t comma = std::min(text.find(',', begin), text.size());
-      words.push_back(text.substr(begin, comma - begin));
-      begin = comma + 1;
-    }
-    return words;
-  }
-
   std::string path_;
   std::string names_;
   std::unique_ptr<SlabReader> reader_;

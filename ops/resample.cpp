@@ -90,7 +90,10 @@ class Resample : public Source {
     surface_ = zeroSet(grid, pitch_mm);
     schema.lattice = latticeAround(surface_->bounds(), pitch_mm);
     const Band band{1, band_mm_};
-    schema.leaves_per_row = leavesPerRow(schema.lattice, band);
+    schema.leaves = leavesOf(schema.lattice, band);
+    // As if the surface were spread evenly over the layers but for a factor of two.
+    schema.leaves_per_row =
+        2 * schema.leaves / (schema.lattice.layers().size() / static_cast<double>(leaf_layers) + 1);
     held_band_mm_ = band.leastMm(pitch_mm);
     field_ = std::make_unique<ZeroSetDistance>(surface_, schema.lattice, band, slack_mm_);
     const int bottom = schema.lattice.layers().begin;
@@ -99,6 +102,8 @@ class Resample : public Source {
   }
 
   [[nodiscard]] double memoryBytes() const override { return surface_->memoryBytes(); }
+
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 400}; }
 
   [[nodiscard]] Grids run(ZRange core) const override {
     const FloatGrid::Ptr surface = field_->run(core);
@@ -187,15 +192,17 @@ class Resample : public Source {
     const ZeroSet::Reading reading = readingOf(*grid);
     const double least_mm = std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
     double cell_mm = 0;
+    double faces_mm2 = 0;
     for (int axis = 0; axis < 3; ++axis) {
-      const Vec3d step(map(axis, 0), map(axis, 1), map(axis, 2));
-      cell_mm = std::max(cell_mm, step.length());
+      const auto step = [&](int of) { return Vec3d(map(of, 0), map(of, 1), map(of, 2)); };
+      cell_mm = std::max(cell_mm, step(axis).length());
+      faces_mm2 += step(axis).cross(step((axis + 1) % 3)).length();
     }
     // Divisions are larger than voxels for speed; what is off, by about an eighth of a division's
     // square over the cell where the surface bends within one, is corrected and added to the band.
     const double divisions = std::clamp(std::ceil(std::sqrt(cell_mm / least_mm) / 2), 1.0, 8.0);
     slack_mm_ = cell_mm / (8 * divisions * divisions);
-    division_mm_ = cell_mm / divisions;
+    division_mm2_ = faces_mm2 / 3 / (divisions * divisions);
     const auto made = [&](const Mat4d& placed) {
       return std::make_shared<const ZeroSet>(grid, placed, reading, static_cast<int>(divisions));
     };
@@ -223,15 +230,12 @@ class Resample : public Source {
                       Coord::ceil((bounds.max + margin_mm) / pitch_mm))};
   }
 
-  /// As if the surface were spread evenly over the layers but for a factor of two.
-  [[nodiscard]] double leavesPerRow(const Lattice& lattice, const Band& band) const {
+  [[nodiscard]] double leavesOf(const Lattice& lattice, const Band& band) const {
     // Three divisions are passed where the area is that of the faces of two.
-    const double area = surface_->cells() * division_mm_ * division_mm_ / 1.5;
+    const double area = surface_->cells() * division_mm2_ / 1.5;
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
     const double across_mm = 0.5 * (leaf_mm.x() + leaf_mm.y() + leaf_mm.z());
-    const double leaves =
-        area * (2 * band.greatestMm(lattice.pitch_mm) + across_mm) / leaf_mm.product();
-    return 2 * leaves / (lattice.layers().size() / static_cast<double>(leaf_layers) + 1);
+    return area * (2 * band.greatestMm(lattice.pitch_mm) + across_mm) / leaf_mm.product();
   }
 
   std::string path_;
@@ -245,7 +249,7 @@ class Resample : public Source {
   bool place_ = false;
   double band_mm_ = 0;
 
-  double division_mm_ = 0;
+  double division_mm2_ = 0;  ///< the mean face of a division of a cell
   double slack_mm_ = 0;
   double held_band_mm_ = 0;
   std::shared_ptr<const ZeroSet> surface_;

@@ -4,6 +4,7 @@
 
 #include "io/printer_profile.h"
 #include "ops/kernels/gaussian_spread.h"
+#include "vdbdither/comma_list.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/find_grid.h"
 #include "vdbdither/openvdb.h"
@@ -42,6 +43,8 @@ class Simulate : public Filter {
     return {{"solid", Reach::stencil(spread_->reach().z())}};
   }
 
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 42}; }
+
   [[nodiscard]] Grids run(const Slab& in) const override {
     return {{"printed", spread_->run(*findGrid<openvdb::BoolGrid>(in.grids, "solid"), box_, in.core,
                                      in.valid)}};
@@ -56,18 +59,13 @@ class Simulate : public Filter {
       const Vec3d stated = printerProfileFromJson(profile->second).point_spread_mm;
       return stated.isZero() ? Vec3d(usual_mm) : stated;
     }
+    const std::vector<std::string> lengths = commaList(spread_text_);
+    if (lengths.size() != 1 && lengths.size() != 3) refuse();
     Vec3d spread_mm;
-    int count = 0;
-    for (std::size_t begin = 0; begin <= spread_text_.size();) {
-      const std::size_t comma = std::min(spread_text_.find(',', begin), spread_text_.size());
-      if (count == 3) refuse();
-      spread_mm[count++] = parseLengthMm(spread_text_.substr(begin, comma - begin));
-      begin = comma + 1;
-    }
-    if (count == 2) refuse();
-    if (count == 1) spread_mm = Vec3d(spread_mm[0]);
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!(spread_mm[axis] >= 0)) refuse();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double length_mm = parseLengthMm(lengths[axis % lengths.size()]);
+      if (!(length_mm >= 0)) refuse();
+      spread_mm[static_cast<int>(axis)] = length_mm;
     }
     return spread_mm;
   }

@@ -109,6 +109,7 @@ class SliceExport : public Sink {
   [[nodiscard]] OutputEstimate output() const override {
     // Measured on dithered spheres, per leaf at the surface and per slice. A file of a folder
     // wastes half a block of the disk.
+    if (schema_.leaves == 0) return {folder_, 0};
     const double stacks = oneStackEach() ? static_cast<double>(materials_.size()) : 1;
     const double per_leaf = format_ == "png"    ? 125
                             : format_ == "tiff" ? 250
@@ -116,6 +117,11 @@ class SliceExport : public Sink {
                                                 : 80 * stacks;
     const double per_slice = 500 + (folder_.ends_with(".zip") ? 0 : 2048 * stacks);
     return {folder_, schema_.leaves * per_leaf + schema_.lattice.layers().size() * per_slice};
+  }
+
+  [[nodiscard]] std::optional<Work> work() const override {
+    const double stacks = oneStackEach() ? static_cast<double>(materials_.size()) : 1;
+    return Work{.us_per_leaf = 10 * stacks, .us_per_layer = 200 * stacks};
   }
 
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {

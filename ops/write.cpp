@@ -1,8 +1,11 @@
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <unistd.h>
 #include <utility>
 #include <vector>
+
+#include <openvdb/tools/Prune.h>
 
 #include "io/frames.h"
 #include "io/staged_output.h"
@@ -10,11 +13,30 @@
 #include "io/vdb.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/layers.h"
+#include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
+#include "vdbdither/visit_grid.h"
 
 namespace vdbdither {
 
 namespace {
+
+/// All slabs of a grid in one, in canonical form; `pieces` is empty then.
+GridConstPtr whole(std::vector<Layers>& pieces, ZRange layers) {
+  const GridConstPtr joined = joinLayers(pieces, layers);
+  if (joined == pieces.front().grid) {
+    pieces.clear();
+    return pruned(joined);
+  }
+  pieces.clear();
+  // Joined just now, so nobody else's: it needs no copy to be changed.
+  const auto own = std::const_pointer_cast<openvdb::GridBase>(joined);
+  visitGrid(*own, [&](const auto& typed) {
+    using GridT = std::decay_t<decltype(typed)>;
+    openvdb::tools::prune(openvdb::gridPtrCast<GridT>(own)->tree());
+  });
+  return own;
+}
 
 /// Slabs into one .vdb file, or as frames on a pipe. Stands in at the end of a chain that ends
 /// without a sink; in the middle it archives the stage.
@@ -31,6 +53,7 @@ class WriteOperator : public Sink {
     schema_ = in;
     if (in.grids.empty()) throw UsageError("there is no grid to write");
     if (!isPipe()) {
+      refuseOtherFormats();
       StagedOutput::check(path_, StagedOutput::Kind::file, overwrite_);
       output_.emplace(path_, StagedOutput::Kind::file);
     } else if (::isatty(dataOutput())) {
@@ -44,12 +67,19 @@ class WriteOperator : public Sink {
   [[nodiscard]] bool isBarrier() const override { return !isPipe(); }
   [[nodiscard]] OutputEstimate output() const override {
     if (isPipe()) return {};
-    // Measured on spheres: what is active, packed.
-    constexpr double share = 0.2;
+    // Measured on spheres and bunnies: what is active, packed. Bits are not packed.
+    double per_leaf = 0;
+    for (const auto& [name, grid] : schema_.grids) {
+      const bool bits = grid->isType<openvdb::BoolGrid>() || grid->isType<openvdb::MaskGrid>();
+      per_leaf += leafBytes(grid) * (bits ? 1.1 : half_ ? 0.14 : 0.2);
+    }
+    return {path_, schema_.leaves * per_leaf};
+  }
+  [[nodiscard]] std::optional<Work> work() const override {
+    constexpr double us_per_byte = 4e-3;
     double bytes = 0;
-    for (const auto& [name, grid] : schema_.grids)
-      bytes += share * schema_.leaves * leafBytes(grid) * (half_ ? 0.7 : 1);
-    return {path_, bytes};
+    for (const auto& [name, grid] : schema_.grids) bytes += leafBytes(grid);
+    return Work{.us_per_leaf = us_per_byte * bytes};
   }
   [[nodiscard]] bool writesToStandardOutput() const override { return isPipe(); }
 
@@ -71,10 +101,7 @@ class WriteOperator : public Sink {
       return;
     }
     Grids grids;
-    for (auto& [name, pieces] : pieces_) {
-      grids[name] = pruned(joinLayers(pieces, schema_.lattice.layers()));
-      pieces.clear();
-    }
+    for (auto& [name, pieces] : pieces_) grids[name] = whole(pieces, schema_.lattice.layers());
     if (grids.empty()) grids = schema_.grids;
     VdbContents contents = contentsOf(schema_, grids);
     if (written_ != schema_.lattice.layers()) {
@@ -90,6 +117,22 @@ class WriteOperator : public Sink {
 
  private:
   [[nodiscard]] bool isPipe() const { return path_.empty() || path_ == "-"; }
+
+  void refuseOtherFormats() const {
+    const std::string extension = std::filesystem::path(path_).extension();
+    for (const char* mesh : {".stl", ".obj", ".ply"}) {
+      if (extension == mesh)
+        throw UsageError("'" + path_ +
+                         "' is a mesh by its name, and this is a .vdb; mesh-export "
+                         "writes meshes");
+    }
+    for (const char* picture : {".png", ".tif", ".tiff", ".exr", ".zip"}) {
+      if (extension == picture)
+        throw UsageError("'" + path_ +
+                         "' holds pictures by its name, and this is a .vdb; "
+                         "slice-export writes slices and render a picture");
+    }
+  }
 
   void beginFrames() {
     if (!std::exchange(begun_, true)) frames_->head(schema_);

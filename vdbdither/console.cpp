@@ -23,10 +23,18 @@ std::string clockText(double seconds) {
 
 }  // namespace
 
-void Console::begin(bool quiet, double box_voxels) {
+void Console::begin(bool quiet, double box_voxels, double expected_seconds) {
   terminal_ = !quiet && ::isatty(STDERR_FILENO);
   box_voxels_ = box_voxels;
+  expected_seconds_ = expected_seconds;
   start_ = last_ = Clock::now();
+  // The first word of a stage may take its time.
+  if (terminal_ && expected_seconds >= 1) {
+    std::fprintf(stderr, "\r\033[K%-16s   0 %%  about %s left", "",
+                 clockText(expected_seconds).c_str());
+    std::fflush(stderr);
+    shown_ = true;
+  }
 }
 
 void Console::warn(const std::string& stage, const std::string& text) {
@@ -44,6 +52,8 @@ void Console::progress(const std::string& stage, int done, int total, double fra
   if (done > 0 && share > 0) {
     std::fprintf(stderr, "  %.0f Mvoxel/s  %s left", share * box_voxels_ / seconds / 1e6,
                  clockText(seconds * (1 - share) / share).c_str());
+  } else if (seconds < expected_seconds_) {
+    std::fprintf(stderr, "  about %s left", clockText(expected_seconds_ - seconds).c_str());
   }
   std::fflush(stderr);
   shown_ = true;

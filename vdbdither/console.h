@@ -12,7 +12,8 @@ namespace vdbdither {
 class Console : public Watcher {
  public:
   /// `quiet`: warnings only. `box_voxels`: what the whole run goes through, for the rate.
-  void begin(bool quiet, double box_voxels);
+  /// `expected_seconds`: how long it may take, told until layers come; 0 where unknown.
+  void begin(bool quiet, double box_voxels, double expected_seconds);
   void warn(const std::string& stage, const std::string& text) override;
   void progress(const std::string& stage, int done, int total, double fraction) override;
   /// Takes the line away.
@@ -24,6 +25,7 @@ class Console : public Watcher {
   bool shown_ = false;
   bool terminal_ = false;
   double box_voxels_ = 0;
+  double expected_seconds_ = 0;
   Clock::time_point start_;
   Clock::time_point last_;
 };

@@ -23,6 +23,28 @@ bool within(ZRange inner, ZRange outer) {
   return inner.begin >= outer.begin && inner.end <= outer.end;
 }
 
+/// Calls `on_tile(index)` or `on_child(node)` for every entry of an internal node's table that
+/// holds some of `range`, and looks at no other.
+template <typename Node, typename OnTile, typename OnChild>
+void forEachEntry(const Node& node, ZRange range, const OnTile& on_tile, const OnChild& on_child) {
+  constexpr int edge = 1 << Node::LOG2DIM;
+  constexpr int step = static_cast<int>(Node::ChildNodeType::DIM);
+  const ZRange layers = intersection(layersOf(node.getNodeBoundingBox()), range);
+  if (layers.empty()) return;
+  const int begin = (layers.begin - node.origin().z()) / step;
+  const int end = (layers.end - node.origin().z() + step - 1) / step;
+  for (int column = 0; column < edge * edge; ++column) {
+    for (int z = begin; z < end; ++z) {
+      const auto index = static_cast<openvdb::Index>(edge * column + z);
+      if (node.isChildMaskOn(index)) {
+        on_child(*node.getTable()[index].getChild());
+      } else {
+        on_tile(index);
+      }
+    }
+  }
+}
+
 /// Copies the part of a tree that lies in `range` into another one that has nothing there yet.
 template <typename TreeT>
 class LayerCopy {
@@ -35,29 +57,29 @@ class LayerCopy {
 
   void run() {
     const auto& root = source_.root();
-    for (auto tile = root.cbeginValueAll(); tile; ++tile) copyTile(tile, root.getLevel());
+    for (auto tile = root.cbeginValueAll(); tile; ++tile) {
+      if (tile.isValueOn() || tile.getValue() != target_.background())
+        fill(tile.getCoord(), root.getLevel(), tile.getValue(), tile.isValueOn());
+    }
     for (auto child = root.cbeginChildOn(); child; ++child) copyNode(*child);
   }
 
  private:
   template <typename Node>
   void copyNode(const Node& node) {
-    if (intersection(layersOf(node.getNodeBoundingBox()), range_).empty()) return;
-    for (auto tile = node.cbeginValueAll(); tile; ++tile) copyTile(tile, Node::LEVEL);
-    for (auto child = node.cbeginChildOn(); child; ++child) {
+    const auto copy_tile = [&](openvdb::Index index) {
+      const Value value = node.getTable()[index].getValue();
+      const bool active = node.isValueMaskOn(index);
+      if (active || value != target_.background())
+        fill(node.offsetToGlobalCoord(index), Node::LEVEL, value, active);
+    };
+    forEachEntry(node, range_, copy_tile, [&](const auto& child) {
       if constexpr (Node::LEVEL == 1) {
-        copyLeaf(*child);
+        copyLeaf(child);
       } else {
-        copyNode(*child);
+        copyNode(child);
       }
-    }
-  }
-
-  template <typename Tile>
-  void copyTile(const Tile& tile, int level) {
-    const Value value = tile.getValue();
-    if (tile.isValueOn() || value != target_.background())
-      fill(tile.getCoord(), level, value, tile.isValueOn());
+    });
   }
 
   /// Fills what `range_` has of the tile at `origin`, as few and as large tiles as can be.
@@ -110,9 +132,42 @@ class LayerCopy {
 
   const TreeT& source_;
   TreeT& target_;
-  openvdb::tree::ValueAccessor<TreeT> accessor_;
+  openvdb::tree::ValueAccessor<TreeT, false> accessor_;
   ZRange range_;
 };
+
+/// Whether an internal node has nothing but background outside `range`.
+template <typename Node, typename Value>
+bool endsWithin(const Node& node, ZRange range, const Value& background) {
+  bool ends = true;
+  const ZRange layers = layersOf(node.getNodeBoundingBox());
+  for (const ZRange outside : {ZRange{layers.begin, range.begin}, ZRange{range.end, layers.end}}) {
+    if (outside.empty()) continue;
+    const auto look_at_tile = [&](openvdb::Index index) {
+      ends &= !node.isValueMaskOn(index) && node.getTable()[index].getValue() == background;
+    };
+    forEachEntry(node, outside, look_at_tile, [&]([[maybe_unused]] const auto& child) {
+      if constexpr (Node::LEVEL == 1) {
+        ends = false;
+      } else {
+        ends &= endsWithin(child, range, background);
+      }
+    });
+  }
+  return ends;
+}
+
+/// The same of a tree.
+template <typename Tree>
+bool endsWithin(const Tree& tree, ZRange range) {
+  for (auto tile = tree.root().cbeginValueAll(); tile; ++tile) {
+    if (tile.isValueOn() || tile.getValue() != tree.background()) return false;
+  }
+  for (auto child = tree.root().cbeginChildOn(); child; ++child) {
+    if (!endsWithin(*child, range, tree.background())) return false;
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -131,6 +186,22 @@ GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted) {
     result = joined;
   });
   return result;
+}
+
+bool addLayers(GridBase& grid, ZRange own, std::span<const Layers> pieces, ZRange wanted) {
+  bool could = true;
+  visitGrid(grid, [&](const auto& typed) {
+    using GridT = std::decay_t<decltype(typed)>;
+    auto& target = static_cast<GridT&>(grid).tree();
+    could = endsWithin(target, alignedToLeaves(own));
+    if (!could) return;
+    for (const Layers& piece : pieces) {
+      const ZRange range = intersection(piece.range, wanted);
+      if (!range.empty())
+        LayerCopy(static_cast<const GridT&>(*piece.grid).tree(), target, range).run();
+    }
+  });
+  return could;
 }
 
 GridConstPtr pruned(const GridConstPtr& grid) {

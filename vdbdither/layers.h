@@ -20,6 +20,11 @@ struct Layers {
 /// type that slabs cannot carry (points, strings).
 GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted);
 
+/// Adds the layers of `pieces` within `wanted` to `grid`, which has those of `own` already; `own`
+/// meets the ranges of the pieces at multiples of eight. False, and nothing is done, where `grid`
+/// has something outside the leaves of `own`.
+bool addLayers(openvdb::GridBase& grid, ZRange own, std::span<const Layers> pieces, ZRange wanted);
+
 /// The canonical form: nodes of one value and state are tiles, so that topology depends on the
 /// voxels alone.
 GridConstPtr pruned(const GridConstPtr& grid);

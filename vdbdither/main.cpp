@@ -81,6 +81,7 @@ std::string reportJson(const Pipeline& pipeline, double seconds) {
   nlohmann::ordered_json json;
   json["version"] = version;
   json["seconds"] = seconds;
+  if (const auto expected = pipeline.expectedSeconds()) json["expected_seconds"] = *expected;
   json["layers"] = pipeline.layers();
   json["box_voxels"] = pipeline.boxVoxels();
   json["peak_memory_bytes"] = peakMemoryBytes();
@@ -88,9 +89,11 @@ std::string reportJson(const Pipeline& pipeline, double seconds) {
   for (const StageReport& stage : pipeline.reports()) {
     nlohmann::ordered_json entry{{"name", stage.name},
                                  {"seconds", stage.seconds},
+                                 {"cpu_seconds", stage.cpu_seconds},
                                  {"active_voxels", stage.active_voxels},
                                  {"bytes", stage.bytes},
                                  {"peak_memory_bytes", stage.peak_memory_bytes}};
+    if (stage.expected_cpu_seconds) entry["expected_cpu_seconds"] = *stage.expected_cpu_seconds;
     for (const auto& [name, value] : stage.counts) entry["counts"][name] = value;
     json["stages"].push_back(entry);
   }
@@ -135,11 +138,12 @@ void runChain(const std::vector<std::string>& words) {
   if (const OperatorInfo* info = pipeline.helpWanted())
     return printData(helpText(pageOf(*info)).c_str());
   ProgramConsole console(pipeline.writesToStandardOutput());
-  console.begin(options.quiet, 0);
+  console.begin(options.quiet, 0, 0);
   const auto start = std::chrono::steady_clock::now();
   pipeline.plan(console);
   if (options.explain) return printData(pipeline.explanation().c_str());
-  console.begin(options.quiet || options.verbose, pipeline.boxVoxels());
+  console.begin(options.quiet || options.verbose, pipeline.boxVoxels(),
+                pipeline.expectedSeconds().value_or(0));
   try {
     pipeline.run();
   } catch (...) {
@@ -155,7 +159,10 @@ void runChain(const std::vector<std::string>& words) {
 
 void runProgram(int argc, char** argv) {
   const std::vector<std::string> words = chainWords(argc, argv);
-  if (words.empty()) throw UsageError("no operator; see vdbdither --help");
+  if (words.empty()) {
+    std::fputs(overview().c_str(), stderr);
+    throw UsageError("there is no operator");
+  }
   if (std::find(words.begin(), words.end(), "--version") != words.end())
     return printData((std::string("vdbdither ") + version + "\n").c_str());
   if (words.front() == "--help" || words.front() == "-h" || words.front() == "help") {
@@ -167,9 +174,18 @@ void runProgram(int argc, char** argv) {
   runChain(words);
 }
 
+/// Whether a message begins with the stage that it is about.
+bool namesItsStage(const std::string& message) {
+  const std::string first = message.substr(0, message.find(": "));
+  const auto operators = registeredOperators();
+  return findCommand(first) || first == "run" ||
+         std::any_of(operators.begin(), operators.end(),
+                     [&](const OperatorInfo* info) { return first == info->name; });
+}
+
 int guardedMain(int argc, char** argv) {
   const auto fail = [](const char* message, int code) {
-    std::fprintf(stderr, "vdbdither %s\n", message);
+    std::fprintf(stderr, "vdbdither%s %s\n", namesItsStage(message) ? "" : ":", message);
     return code;
   };
   // What one slab frees the next one wants again: giving it back to the system in between takes

@@ -44,6 +44,14 @@ class Reporter {
   virtual void print(const std::string& /*text*/) {}
 };
 
+/// What an operator's computing costs, as CPU time of one thread of the machine it was measured on
+/// (docs/performance.md). A leaf is one that the surface crosses.
+struct Work {
+  double us_per_leaf = 0;
+  double us_per_layer = 0;
+  double seconds = 0;  ///< once, whatever the layers
+};
+
 /// One verb. `declare` binds the options; `plan` makes every check that can be made before the
 /// first voxel.
 class Operator {
@@ -52,6 +60,10 @@ class Operator {
   virtual void declare(Options& options) = 0;
   /// Bytes that the operator holds besides its slabs, known after `plan`.
   [[nodiscard]] virtual double memoryBytes() const { return 0; }
+
+  /// What its `run` or `write` and `finish` will cost, for --explain; nothing where nobody has
+  /// measured it. Asked after `plan`.
+  [[nodiscard]] virtual std::optional<Work> work() const { return std::nullopt; }
 
   /// Whether it holds the whole volume at once, which --explain announces and --stream refuses.
   /// Asked after `plan`.

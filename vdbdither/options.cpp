@@ -9,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "vdbdither/comma_list.h"
 #include "vdbdither/errors.h"
 
 namespace vdbdither {
@@ -235,17 +236,11 @@ void Options::triple(std::string name, openvdb::Vec3d& target, std::string value
   option.fallback = option.get();
   option.set = [&target](const std::string& text) {
     const std::string wanted = "three numbers such as 0,45,90, or one for all three";
-    std::array<double, 3> values{};
-    std::size_t count = 0;
-    for (std::size_t begin = 0; begin <= text.size();) {
-      const std::size_t comma = std::min(text.find(',', begin), text.size());
-      if (count == 3) throw UsageError("'" + text + "' is not " + wanted);
-      values[count++] = parseNumber(text.substr(begin, comma - begin), wanted);
-      begin = comma + 1;
-    }
-    if (count == 2) throw UsageError("'" + text + "' is not " + wanted);
-    target =
-        count == 1 ? openvdb::Vec3d(values[0]) : openvdb::Vec3d(values[0], values[1], values[2]);
+    const std::vector<std::string> numbers = commaList(text);
+    if (numbers.size() != 1 && numbers.size() != 3)
+      throw UsageError("'" + text + "' is not " + wanted);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      target[static_cast<int>(axis)] = parseNumber(numbers[axis % numbers.size()], wanted);
   };
 }
 
@@ -297,7 +292,7 @@ void Options::parse(std::span<const std::string> arguments, const Options& commo
   if (extras.empty()) {
     for (const Option& option : options_) {
       if (option.required && option.get().empty())
-        throw UsageError(option.name + " is missing; see --help");
+        throw UsageError("no " + option.name + " is given; see --help");
     }
     return;
   }

@@ -28,9 +28,11 @@ class Watcher {
 struct StageReport {
   std::string name;
   double seconds = 0;
-  double active_voxels = 0;      ///< of all grids it gave out
-  double bytes = 0;              ///< in memory, of all grids it gave out
-  double peak_memory_bytes = 0;  ///< of the process, when the stage last returned
+  double cpu_seconds = 0;                      ///< of all threads
+  std::optional<double> expected_cpu_seconds;  ///< planned; nothing where unknown
+  double active_voxels = 0;                    ///< of all grids it gave out
+  double bytes = 0;                            ///< in memory, of all grids it gave out
+  double peak_memory_bytes = 0;                ///< of the process, when the stage last returned
   std::vector<std::pair<std::string, double>> counts;  ///< what the operator itself counted
 };
 
@@ -63,6 +65,8 @@ class Pipeline {
   [[nodiscard]] bool writesToStandardOutput() const;
   [[nodiscard]] int layers() const { return wanted_.size(); }
   [[nodiscard]] double boxVoxels() const;
+  /// About how long `run` takes; nothing where that is unknown. Asked after `plan`.
+  [[nodiscard]] std::optional<double> expectedSeconds() const;
 
  private:
   class Stage;
@@ -78,6 +82,8 @@ class Pipeline {
   void drain();
   [[nodiscard]] double expectedMemoryBytes(int slab_layers) const;
   [[nodiscard]] double memoryBudgetBytes() const;
+  void planWork();
+  [[nodiscard]] std::string timeText() const;
   [[nodiscard]] OutputEstimate expectedOutput(const Stage& stage) const;
   void checkDisk() const;
 

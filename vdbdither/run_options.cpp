@@ -1,5 +1,6 @@
 #include "vdbdither/run_options.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdio>
@@ -72,6 +73,21 @@ std::string bytesText(double bytes) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), bytes < 10 && unit[0] != 'B' ? "%.1f %s" : "%.0f %s",
                 bytes, unit);
+  return text.data();
+}
+
+std::string durationText(double seconds) {
+  double value = std::max(seconds, 0.1);
+  const char* unit = "s";
+  if (seconds >= 3600) {
+    value = seconds / 3600;
+    unit = "h";
+  } else if (seconds >= 120) {
+    value = seconds / 60;
+    unit = "min";
+  }
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), value < 9.95 ? "%.1f %s" : "%.0f %s", value, unit);
   return text.data();
 }
 

@@ -33,4 +33,7 @@ double parseBytes(const std::string& text);
 /// 1.5 GiB, 12 MiB, 640 B.
 std::string bytesText(double bytes);
 
+/// `0.4 s`, `12 s`, `3 min`, `2.5 h`: two digits, for estimates.
+std::string durationText(double seconds);
+
 }  // namespace vdbdither

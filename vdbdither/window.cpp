@@ -31,27 +31,61 @@ Slab cutTo(const Slab& slab, ZRange core) {
   return cut;
 }
 
-Window::Window(std::vector<Read> reads, ZRange layers, ZRange cores)
-    : reads_(std::move(reads)), layers_(layers), cores_(cores), reach_(widest(reads_)) {}
+Window::Window(std::vector<Read> reads, ZRange layers, ZRange cores,
+               std::set<std::string, std::less<>> passing)
+    : reads_(std::move(reads)),
+      layers_(layers),
+      cores_(cores),
+      passing_(std::move(passing)),
+      reach_(widest(reads_)) {}
 
 ZRange Window::halo(ZRange core) const { return reached(core, reach_, layers_); }
 
-Window::Task Window::makeTask(const Slab& slab, ZRange core) const {
-  Task task{{core, halo(core), {}}, cutTo(slab, core)};
+Window::Task Window::makeTask(Slab& slab, ZRange core) {
+  Slab passing{slab.core, slab.core, {}};
+  for (const auto& [name, grid] : slab.grids) {
+    if (passing_.contains(name)) passing.grids[name] = grid;
+  }
+  Task task{{core, halo(core), {}}, cutTo(passing, core)};
+  passing.grids.clear();
   for (const Read& read : reads_) {
-    // Leaves are copied whole or not at all.
-    const ZRange wanted =
-        intersection(alignedToLeaves(reached(core, read.reach, layers_)), layers_);
-    std::vector<Layers> pieces;
-    for (const Slab& piece : slabs_) {
-      if (intersection(piece.core, wanted).empty()) continue;
-      if (const auto found = piece.grids.find(read.grid); found != piece.grids.end()) {
-        pieces.push_back({found->second, piece.core});
-      }
-    }
-    if (!pieces.empty()) task.input.grids[read.grid] = joinLayers(pieces, wanted);
+    if (GridConstPtr grid = inputGrid(slab, read, core))
+      task.input.grids[read.grid] = std::move(grid);
   }
   return task;
+}
+
+/// What `read` says of a grid around `core`, a part of `slab`. A grid that nobody else holds is not
+/// copied but grows by its halo, and the window keeps a copy of the layers that later cores reach.
+GridConstPtr Window::inputGrid(Slab& slab, const Read& read, ZRange core) {
+  // Leaves are copied whole or not at all.
+  const auto wanted_around = [&](ZRange range) {
+    return intersection(alignedToLeaves(reached(range, read.reach, layers_)), layers_);
+  };
+  const ZRange wanted = wanted_around(core);
+  std::vector<Layers> halo;
+  for (const Slab& piece : slabs_) {
+    const auto found = piece.grids.find(read.grid);
+    if (found == piece.grids.end() || intersection(piece.core, wanted).empty()) continue;
+    if (&piece != &slab) halo.push_back({found->second, piece.core});
+  }
+  const auto own = slab.grids.find(read.grid);
+  if (own == slab.grids.end()) return halo.empty() ? nullptr : joinLayers(halo, wanted);
+
+  const int kept_begin =
+      core.end < cores_.end ? wanted_around({core.end, core.end + 1}).begin : core.end;
+  if (core == slab.core && kept_begin > core.begin && own->second.use_count() == 1 &&
+      !halo.empty()) {
+    const Layers whole{own->second, core};
+    const GridConstPtr kept = joinLayers({&whole, 1}, {kept_begin, core.end});
+    const auto grid = std::const_pointer_cast<openvdb::GridBase>(own->second);
+    if (addLayers(*grid, core, halo, wanted)) {
+      own->second = kept;
+      return grid;
+    }
+  }
+  halo.push_back({own->second, slab.core});
+  return joinLayers(halo, wanted);
 }
 
 Slab Window::joined() const {

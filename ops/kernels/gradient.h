@@ -5,6 +5,7 @@
 #include <openvdb/openvdb.h>
 
 #include "ops/kernels/leaf_bits.h"
+#include "ops/kernels/leaf_surroundings.h"
 #include "vdbdither/lattice.h"
 
 namespace vdbdither {
@@ -23,7 +24,7 @@ class LeafNormals {
   LeafNormals(const openvdb::FloatTree& surface, const openvdb::Vec3d& pitch_mm, ZRange valid);
 
   /// Turns to the voxels of `leaf`, a leaf of `surface`.
-  void visit(const FloatLeaf& leaf);
+  void visit(const FloatLeaf& leaf) { around_.visit(leaf); }
 
   /// The normal of the active voxel at `offset` in the leaf.
   [[nodiscard]] openvdb::Vec3s normal(unsigned offset) const;
@@ -33,22 +34,12 @@ class LeafNormals {
   using Row = std::array<std::array<float, 8>, 3>;
   [[nodiscard]] Row row(unsigned offset) const;
 
- private:
-  void setRow(int tile_offset, const float* values, std::uint8_t active);
+  /// The distances that they are made of.
+  [[nodiscard]] const LeafSurroundings& around() const { return around_; }
 
-  /// The leaf and the layer of voxels around its faces; inactive voxels hold `no_sample`.
-  static constexpr int edge = 10;
-  static constexpr int tileOffset(int x, int y, int z) {
-    return ((x + 1) * edge + y + 1) * edge + z + 1;
-  }
-  static constexpr int tileOffset(unsigned leaf_offset) {
-    const auto n = static_cast<int>(leaf_offset);
-    return tileOffset(n / 64, n / 8 % 8, n % 8);
-  }
-  std::array<float, edge * edge * edge> tile_{};
-  openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> surface_;
+ private:
+  LeafSurroundings around_;
   openvdb::Vec3f per_pitch_;  ///< 1 / pitch, 1/mm
-  ZRange valid_;
 };
 
 /// The normals of every active voxel of `surface` (leaves only) within `core`; zero elsewhere.

@@ -9,6 +9,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -136,24 +137,49 @@ typename Tree::LeafNodeType* newLeaf(const Coord& origin, const typename Tree::V
   return leaf;
 }
 
-/// Sets level-1 tiles, most of them along runs within one parent.
-class TileWriter {
- public:
-  explicit TileWriter(openvdb::FloatTree& tree) : accessor_(tree) {}
+/// Leaves beside each other along x, from the one at `origin` on.
+struct Run {
+  Coord origin;
+  int leaves;
+};
 
-  void set(const Coord& xyz, float value) {
-    const Coord origin = xyz & ~(Parent::DIM - 1);
-    if (!parent_ || origin != parent_->origin()) {
-      accessor_.addTile(1, xyz, value, false);
-      parent_ = accessor_.probeNode<Parent>(xyz);
-    } else {
-      parent_->addTile(1, xyz, value, false);
+/// Hangs leaves and tiles into the nodes above leaves, which must be there. Several threads may do
+/// so at once in different nodes.
+template <class Tree>
+class NodeWriter {
+ public:
+  using Parent = typename Tree::RootNodeType::ChildNodeType::ChildNodeType;
+
+  static Coord parentOf(const Coord& xyz) { return xyz & ~(static_cast<int>(Parent::DIM) - 1); }
+
+  /// Makes the node above the leaf at `origin`.
+  static void makeParent(Tree& tree, const Coord& origin) {
+    if (!tree.template probeConstNode<Parent>(origin))
+      tree.addTile(1, origin, tree.background(), false);
+  }
+
+  explicit NodeWriter(Tree& tree) : tree_(tree) {}
+
+  void set(std::unique_ptr<typename Tree::LeafNodeType> leaf) {
+    Parent& parent = parentAt(leaf->origin());
+    parent.addLeaf(leaf.release());
+  }
+
+  void set(const Run& run, const typename Tree::ValueType& value) {
+    for (int leaf = 0; leaf < run.leaves; ++leaf) {
+      const Coord origin = run.origin.offsetBy(leaf * edge, 0, 0);
+      parentAt(origin).addTile(Parent::coordToOffset(origin), value, false);
     }
   }
 
  private:
-  using Parent = openvdb::FloatTree::RootNodeType::ChildNodeType::ChildNodeType;
-  openvdb::tree::ValueAccessor<openvdb::FloatTree> accessor_;
+  Parent& parentAt(const Coord& xyz) {
+    if (!parent_ || parent_->origin() != parentOf(xyz))
+      parent_ = tree_.template probeNode<Parent>(xyz);
+    return *parent_;
+  }
+
+  Tree& tree_;
   Parent* parent_ = nullptr;
 };
 
@@ -196,7 +222,27 @@ class MeshDistance::Block {
   /// What it comes to.
   struct Made {
     std::vector<Leaf> leaves;
-    std::vector<Coord> interior;  ///< origins of the leaves that are wholly inside
+    std::vector<Run> interior;   ///< leaves that are wholly inside
+    std::vector<Coord> parents;  ///< origins of the few nodes above all of them
+
+    void add(Leaf leaf) {
+      noteParent(leaf.surface->origin());
+      leaves.push_back(std::move(leaf));
+    }
+    void add(const Run& run) {
+      const int end = run.origin.x() + run.leaves * edge;
+      for (Coord at = NodeWriter<openvdb::FloatTree>::parentOf(run.origin); at.x() < end;
+           at.x() += static_cast<int>(NodeWriter<openvdb::FloatTree>::Parent::DIM))
+        noteParent(at);
+      interior.push_back(run);
+    }
+
+   private:
+    void noteParent(const Coord& xyz) {
+      const Coord parent = NodeWriter<openvdb::FloatTree>::parentOf(xyz);
+      if (std::find(parents.rbegin(), parents.rend(), parent) == parents.rend())
+        parents.push_back(parent);
+    }
   };
 
   /// `voxels`: those that exist. `triangles`: those that may reach them, in the mesh's order.
@@ -374,10 +420,19 @@ LeafBits MeshDistance::Block::existing(const Coord& origin) const {
 MeshDistance::Block::Made MeshDistance::Block::sweep() const {
   Made made;
   std::array<RowWinding, block_rows * LeafDistances::depth> rows;
-  std::uint64_t filled = 0;  // rows with some of the inside in the last plane
+  std::uint64_t filled = 0;   // rows with some of the inside in the last plane
+  std::uint64_t running = 0;  // rows whose last leaf was wholly inside
+  std::array<Run, block_rows * LeafDistances::depth> runs;
+  const auto end_runs = [&](std::uint64_t ended) {
+    for (; ended != 0; ended &= ended - 1) {
+      made.add(runs[static_cast<std::size_t>(std::countr_zero(ended))]);
+      running &= ~(ended & -ended);
+    }
+  };
   for (int x = leaves_.min().x(); x <= leaves_.max().x(); ++x) {
     const std::size_t first = work_.distances.slot({x, leaves_.min().y(), leaves_.min().z()});
     const std::uint64_t occupied = work_.distances.occupied(x);
+    end_runs(running & (occupied | ~filled));
     for (std::uint64_t left = occupied | filled; left != 0; left &= left - 1) {
       const auto row = static_cast<std::uint32_t>(std::countr_zero(left));
       RowWinding& winding = rows[row];
@@ -385,13 +440,16 @@ MeshDistance::Block::Made MeshDistance::Block::sweep() const {
                        leaves_.min().z() + static_cast<int>(row) % LeafDistances::depth);
       const CoordBBox box = CoordBBox::createCube(leaf << 3, edge);
       if (!(occupied >> row & 1) && winding.bits() == ~0ULL && voxels_.isInside(box)) {
-        made.interior.push_back(box.min());
+        if ((running >> row & 1) == 0) runs[row] = {box.min(), 0};
+        running |= std::uint64_t{1} << row;
+        ++runs[row].leaves;
         continue;
       }
       makeLeaf(leaf, winding.advance(work_.distances, first + row), made);
       filled = (filled & ~(1ULL << row)) | std::uint64_t{winding.bits() != 0} << row;
     }
   }
+  end_runs(running);
   return made;
 }
 
@@ -426,7 +484,7 @@ void MeshDistance::Block::makeLeaf(const Coord& leaf_index, const LeafBits& insi
       std::any_of(active.begin(), active.end(), [](std::uint64_t bits) { return bits != 0; });
   if (!any_active && !any_inside) return;
   if (!any_active && !any_outside) {
-    made.interior.push_back(origin);
+    made.add(Run{origin, 1});
     return;
   }
   for (std::size_t plane = 0; plane < edge; ++plane)
@@ -434,7 +492,7 @@ void MeshDistance::Block::makeLeaf(const Coord& leaf_index, const LeafBits& insi
         active[plane];
   if (any_active && (field_.extras_.normals || field_.extras_.closest))
     addExtras(leaf, work_.distances.names(slot));
-  made.leaves.push_back(std::move(leaf));
+  made.add(std::move(leaf));
 }
 
 void MeshDistance::Block::addExtras(Leaf& leaf, const std::uint32_t* names) const {
@@ -509,7 +567,8 @@ double MeshDistance::reachMm(int axis) const {
 }
 
 void MeshDistance::append(const CoordBBox& voxels, DistanceGrids& grids) const {
-  const int first = voxels.min().y() >> 3;
+  // Blocks and nodes begin together.
+  const int first = NodeWriter<openvdb::FloatTree>::parentOf(voxels.min()).y() / edge;
   const auto blocks =
       static_cast<std::uint32_t>(((voxels.max().y() >> 3) - first) / block_rows + 1);
   const double block_mm = block_rows * edge * lattice_.pitch_mm.y();
@@ -531,24 +590,42 @@ void MeshDistance::append(const CoordBBox& voxels, DistanceGrids& grids) const {
   std::vector<Block::Made> made(blocks);
   tbb::enumerable_thread_specific<Block::Workspace> workspaces;
   tbb::parallel_for(std::uint32_t{0}, blocks, [&](std::uint32_t block) {
-    if (triangles.of(block).empty()) return;
     CoordBBox part = voxels;
     const int begin = (first + static_cast<int>(block) * block_rows) * edge;
     part.min().y() = std::max(part.min().y(), begin);
     part.max().y() = std::min(part.max().y(), begin + block_rows * edge - 1);
+    if (part.empty() || triangles.of(block).empty()) return;
     made[block] = Block(*this, part, workspaces.local()).make(triangles.of(block));
   });
 
-  TileWriter tiles(grids.surface->tree());
-  openvdb::FloatGrid::Accessor surface = grids.surface->getAccessor();
-  for (Block::Made& block : made) {
-    for (Block::Leaf& leaf : block.leaves) {
-      if (leaf.normals) grids.normals->tree().addLeaf(leaf.normals.release());
-      if (leaf.closest) grids.closest->tree().addLeaf(leaf.closest.release());
-      surface.addLeaf(leaf.surface.release());
+  for (const Block::Made& block : made) {
+    for (const Coord& origin : block.parents) {
+      NodeWriter<openvdb::FloatTree>::makeParent(grids.surface->tree(), origin);
+      if (grids.normals) NodeWriter<openvdb::Vec3STree>::makeParent(grids.normals->tree(), origin);
+      if (grids.closest) NodeWriter<openvdb::Int32Tree>::makeParent(grids.closest->tree(), origin);
     }
-    for (const Coord& origin : block.interior) tiles.set(origin, -grids.surface->background());
   }
+  // Blocks that share nodes lie in one of these groups.
+  constexpr int group_rows = NodeWriter<openvdb::FloatTree>::Parent::DIM / edge;
+  const std::uint32_t group_blocks = group_rows / block_rows;
+  const std::uint32_t groups = (blocks + group_blocks - 1) / group_blocks;
+  tbb::parallel_for(std::uint32_t{0}, groups, [&](std::uint32_t group) {
+    NodeWriter surface(grids.surface->tree());
+    std::optional<NodeWriter<openvdb::Vec3STree>> normals;
+    std::optional<NodeWriter<openvdb::Int32Tree>> closest;
+    if (grids.normals) normals.emplace(grids.normals->tree());
+    if (grids.closest) closest.emplace(grids.closest->tree());
+    for (std::uint32_t n = group * group_blocks; n < std::min(blocks, (group + 1) * group_blocks);
+         ++n) {
+      for (Block::Leaf& leaf : made[n].leaves) {
+        if (leaf.normals) normals->set(std::move(leaf.normals));
+        if (leaf.closest) closest->set(std::move(leaf.closest));
+        surface.set(std::move(leaf.surface));
+      }
+      for (const Run& run : made[n].interior) surface.set(run, -grids.surface->background());
+      made[n] = {};
+    }
+  });
 }
 
 DistanceGrids MeshDistance::run(ZRange core) const {
@@ -579,7 +656,7 @@ DistanceGrids MeshDistance::run(ZRange core) const {
     append(voxels, grids);
     begin = end;
   }
-  openvdb::tools::prune(grids.surface->tree());
+  openvdb::tools::pruneTiles(grids.surface->tree());
   return grids;
 }
 

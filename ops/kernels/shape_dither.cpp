@@ -4,6 +4,7 @@
 #include "ops/kernels/shape_dither.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -20,6 +21,7 @@ namespace vdbdither {
 
 using openvdb::Coord;
 using openvdb::FloatTree;
+using openvdb::Vec3d;
 using openvdb::Vec3s;
 using openvdb::Vec3STree;
 
@@ -42,33 +44,81 @@ float displacement(const ShapeDither& dither, const Vec3s& normal, const Coord& 
   return static_cast<float>(half_diameter * (double{facet.checker} * half_step + random));
 }
 
-/// The normals of the voxels of one leaf at a time: those given, or the gradient's.
+/// The normals of the voxels of one leaf at a time: those given, or the gradient's, made row by row
+/// when they are asked for.
 class VoxelNormals {
  public:
   VoxelNormals(const ShapeDither& dither, const FloatTree& surface, const Vec3STree* given,
                ZRange valid)
-      : gradient_(surface, dither.pitch_mm, valid) {
+      : gradient_(surface, dither.pitch_mm, valid), per_pitch_(Vec3d(1.0) / dither.pitch_mm) {
     if (given) given_.emplace(*given);
   }
 
   void visit(const FloatLeaf& leaf) {
     leaf_ = &leaf;
-    visited_ = given_.has_value();
+    visited_ = false;
+    rows_made_ = 0;
+  }
+
+  /// The leaf's distances and those around it.
+  const LeafSurroundings& around() {
+    if (!visited_) gradient_.visit(*leaf_);
+    visited_ = true;
+    return gradient_.around();
   }
 
   /// Of the active voxel at `offset`.
   Vec3s operator()(unsigned offset) {
     if (given_) return given_->getValue(leaf_->offsetToGlobalCoord(offset));
-    if (!visited_) gradient_.visit(*leaf_);
-    visited_ = true;
-    return gradient_.normal(offset);
+    makeRow(offset / 8);
+    return {normals_[0][offset], normals_[1][offset], normals_[2][offset]};
+  }
+
+  /// Of `undecided`, at least the voxels within `reach`·k_D of the surface along their normal.
+  LeafBits within(const LeafBits& undecided, double reach) {
+    if (given_) return undecided;
+    LeafBits near = no_bits;
+    const auto limit = static_cast<float>(reach * (1 + 1e-5));
+    for (unsigned row = 0; row < 64; ++row) {
+      const auto bits = static_cast<std::uint8_t>(undecided[row / 8] >> (row % 8 * 8));
+      if (bits == 0) continue;
+      makeRow(row);
+      const float* d = leaf_->buffer().data() + std::size_t{8} * row;
+      std::array<float, 8> steepest{};  // 1 / (2·k_D)
+      for (unsigned axis = 0; axis < 3; ++axis) {
+        const float* normal = &normals_[axis][std::size_t{8} * row];
+        for (unsigned z = 0; z < 8; ++z) {
+          const float steep = std::abs(normal[z]) * per_pitch_[axis];
+          steepest[z] = steep > steepest[z] ? steep : steepest[z];
+        }
+      }
+      std::array<float, 8> diameters;  // |d| / k_D
+      for (unsigned z = 0; z < 8; ++z) diameters[z] = 2 * std::abs(d[z]) * steepest[z];
+      near[row / 8] |=
+          std::uint64_t{static_cast<std::uint8_t>(bits & rowBelow(diameters.data(), limit))}
+          << (row % 8 * 8);
+    }
+    return near;
   }
 
  private:
+  void makeRow(unsigned row) {
+    const std::uint64_t bit = std::uint64_t{1} << row;
+    if ((rows_made_ & bit) != 0) return;
+    rows_made_ |= bit;
+    around();
+    const LeafNormals::Row made = gradient_.row(8 * row);
+    for (unsigned axis = 0; axis < 3; ++axis)
+      std::copy_n(made[axis].data(), 8, &normals_[axis][std::size_t{8} * row]);
+  }
+
   LeafNormals gradient_;
   std::optional<NormalAccessor> given_;
+  openvdb::Vec3f per_pitch_;
   const FloatLeaf* leaf_ = nullptr;
   bool visited_ = false;
+  std::uint64_t rows_made_ = 0;  ///< a bit for each row along z, in the order of the leaf
+  std::array<std::array<float, 512>, 3> normals_{};
 };
 
 /// f on ∂V: active at its voxels. A leaf's transient data holds the bits of its greatest |f|.
@@ -103,7 +153,8 @@ FloatTree surfaceDisplacements(const ShapeDither& dither, const FloatTree& surfa
 }
 
 /// What stands between a voxel's d and its f, one leaf at a time: `visit` returns a bound of |f| in
-/// the leaf, `operator()` f at an active voxel.
+/// the leaf, `operator()` f at an active voxel. `overturnable` are those of the undecided voxels
+/// whose f has to be known to tell its sign from d's.
 class AtClosest {
  public:
   AtClosest(const FloatTree& displacements, const SearchDisk& disk)
@@ -117,6 +168,8 @@ class AtClosest {
     }
     return greatest;
   }
+
+  static LeafBits overturnable(const LeafBits& undecided) { return undecided; }
 
   float operator()(unsigned offset, float) {
     const auto found = closest_(offset);
@@ -138,6 +191,8 @@ class AtFoot {
     return static_cast<float>(dither_.largestDisplacementMm() * (1 + 1e-6));
   }
 
+  static LeafBits overturnable(const LeafBits& undecided) { return undecided; }
+
   float operator()(unsigned offset, float d) {
     Coord ijk = leaf_->offsetToGlobalCoord(offset);
     const Vec3s normal = normals_.getValue(ijk);
@@ -156,13 +211,15 @@ class AtFoot {
 
 class AtVoxel {
  public:
-  AtVoxel(const ShapeDither& dither, const VoxelNormals& normals)
-      : dither_(dither), normals_(normals) {}
+  AtVoxel(const ShapeDither& dither, VoxelNormals& normals) : dither_(dither), normals_(normals) {}
 
   float visit(const FloatLeaf& leaf) {
     leaf_ = &leaf;
-    normals_.visit(leaf);
     return static_cast<float>(dither_.largestDisplacementMm() * (1 + 1e-6));
+  }
+
+  LeafBits overturnable(const LeafBits& undecided) {
+    return normals_.within(undecided, dither_.amplitude / 2);
   }
 
   float operator()(unsigned offset, float d) {
@@ -171,13 +228,14 @@ class AtVoxel {
 
  private:
   const ShapeDither& dither_;
-  VoxelNormals normals_;
+  VoxelNormals& normals_;
   const FloatLeaf* leaf_ = nullptr;
 };
 
 /// No displacement: plain voxelization.
 struct Nowhere {
   float visit(const FloatLeaf&) { return 0; }
+  static LeafBits overturnable(const LeafBits&) { return no_bits; }
   float operator()(unsigned, float) { return 0; }
 };
 
@@ -217,25 +275,26 @@ ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
   const Vec3STree* given = normals ? &normals->tree() : nullptr;
   const auto decide = [&](const auto& make_reader) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size()), [&](const auto& range) {
-      auto f = make_reader();
+      VoxelNormals voxel_normals(*this, surface.tree(), given, valid);
+      auto f = make_reader(voxel_normals);
       WallGuard guard(surface.tree(), pitch_mm, surface.background(), valid);
-      VoxelNormals guard_normals(*this, surface.tree(), given, valid);
       for (std::size_t n = range.begin(); n != range.end(); ++n) {
         const FloatLeaf& leaf = *leaves[n];
         const float* distances = leaf.buffer().data();
         const std::uint8_t within = rowWithin(leaf.origin().z(), core);
         FloatLeaf* moved = displaced ? displaced->tree().probeLeaf(leaf.origin()) : nullptr;
+        voxel_normals.visit(leaf);
         const float f_bound = f.visit(leaf);
-        guard_normals.visit(leaf);
         const float bound = moved ? std::numeric_limits<float>::infinity() : f_bound;
 
         LeafBits inside = insideBits(leaf, within);
         const LeafBits undecided = bandBits(leaf, bound, within);
-        forEachBit(undecided, [&](unsigned offset) {
+        forEachBit(moved ? undecided : f.overturnable(undecided), [&](unsigned offset) {
           const float plain = distances[offset];
           float d = plain + f(offset, plain);
           if (guarded && (d < 0) != (plain < 0) &&
-              !guard.allows(leaf.offsetToGlobalCoord(offset), guard_normals(offset), plain)) {
+              !guard.allows(voxel_normals.around(), leaf.origin(), offset, voxel_normals(offset),
+                            plain)) {
             d = plain;
           }
           const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
@@ -249,18 +308,18 @@ ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
 
   const int halo = reach(true).normals;
   if (amplitude == 0) {
-    decide([] { return Nowhere(); });
+    decide([](VoxelNormals&) { return Nowhere(); });
   } else if (at == DitherAt::closest) {
     const SearchDisk disk(pitch_mm, searchRadiusMm());
     const FloatTree displacements =
         surfaceDisplacements(*this, surface.tree(), given, grownWithin(core, halo, valid), valid);
-    decide([&] { return AtClosest(displacements, disk); });
+    decide([&](VoxelNormals&) { return AtClosest(displacements, disk); });
   } else if (at == DitherAt::foot) {
     const auto made =
         given ? nullptr : outwardNormals(surface, pitch_mm, grownWithin(core, halo, valid), valid);
-    decide([&] { return AtFoot(*this, given ? *given : made->tree()); });
+    decide([&](VoxelNormals&) { return AtFoot(*this, given ? *given : made->tree()); });
   } else {
-    decide([&] { return AtVoxel(*this, VoxelNormals(*this, surface.tree(), given, valid)); });
+    decide([&](VoxelNormals& voxel_normals) { return AtVoxel(*this, voxel_normals); });
   }
 
   return {makeSolidGrid(surface.transform(), printed, insideTiles(surface.tree(), core)),

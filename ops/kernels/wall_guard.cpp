@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <limits>
 
 namespace vdbdither {
 
@@ -14,7 +16,8 @@ constexpr double least_radius_mm = 0.3;
 
 }  // namespace
 
-bool WallGuard::allows(const Coord& ijk, const openvdb::Vec3s& normal, float d_mm) {
+bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsigned offset,
+                       const openvdb::Vec3s& normal, float d_mm) {
   openvdb::Vec3d rise_mm;
   double steepest_per_mm = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -37,18 +40,26 @@ bool WallGuard::allows(const Coord& ijk, const openvdb::Vec3s& normal, float d_m
   const double half_diameter_mm = 0.5 / steepest_per_mm;
   const double depth_mm = std::abs(double{d_mm});
   const int own = d_mm < 0 ? -1 : 1;  // the side that the voxel lies on
-  const auto sample = [&](int side, int i, int j, int k) {
-    return std::clamp(distance(ijk.offsetBy(i, j, k), side, band_mm), -band_mm, band_mm);
+  using At = LeafSurroundings;
+  const float* here = around.at(offset);
+  // How far a voxel is from the surface, on the given side of it.
+  const auto sample = [&](int side, const Coord& step) {
+    const int farthest = std::max({std::abs(step.x()), std::abs(step.y()), std::abs(step.z())});
+    const double d =
+        farthest <= At::halo
+            ? double{here[step.x() * At::stride_x + step.y() * At::stride_y + step.z()]}
+            : distance(origin + FloatLeaf::offsetToLocalCoord(offset) + step);
+    return std::clamp(side * d, -band_mm, band_mm);
   };
 
   // T on its own side, one step further in, then across the face, as many steps as it takes to tell
   // thick from thin.
   const int steps = 1 + static_cast<int>(1.5 * depth_mm / rise_all_mm + 0.95);
-  if (sample(own, own * outward.x(), own * outward.y(), own * outward.z()) < half_diameter_mm)
-    return false;
-  const int across = -own * steps;
-  const double beyond_mm =
-      sample(-own, across * outward.x(), across * outward.y(), across * outward.z());
+  const auto outward_by = [&](int n) {
+    return Coord(n * outward.x(), n * outward.y(), n * outward.z());
+  };
+  if (sample(own, outward_by(own)) < half_diameter_mm) return false;
+  const double beyond_mm = sample(-own, outward_by(-own * steps));
   if (beyond_mm <= -band_mm ||
       beyond_mm < 2 * depth_mm + half_diameter_mm - (steps - 1) * rise_all_mm)
     return false;
@@ -60,7 +71,7 @@ bool WallGuard::allows(const Coord& ijk, const openvdb::Vec3s& normal, float d_m
         const double rise = openvdb::Vec3d(normal).dot(to);
         const double flat_mm = std::clamp(depth_mm + own * rise, -band_mm, band_mm);
         const double bend_mm = (to.lengthSqr() - rise * rise) / (2 * least_radius_mm);
-        const double there_mm = sample(own, i, j, k);
+        const double there_mm = sample(own, {i, j, k});
         if (std::min(flat_mm, there_mm) < half_diameter_mm &&
             std::abs(flat_mm - there_mm) > bend_mm + 0.02 * rise_all_mm)
           return false;
@@ -70,11 +81,11 @@ bool WallGuard::allows(const Coord& ijk, const openvdb::Vec3s& normal, float d_m
   return true;
 }
 
-double WallGuard::distance(const Coord& ijk, int side, double band_mm) {
-  float value = static_cast<float>(background_mm_);
-  const bool active = valid_.contains(ijk.z()) && surface_.probeValue(ijk, value);
-  const double distance_mm = side * double{value};
-  return active ? distance_mm : std::copysign(band_mm, distance_mm);
+double WallGuard::distance(const Coord& ijk) {
+  constexpr double none = std::numeric_limits<double>::infinity();
+  float value = 0;
+  if (!valid_.contains(ijk.z())) return none;
+  return surface_.probeValue(ijk, value) ? double{value} : std::copysign(none, double{value});
 }
 
 }  // namespace vdbdither

@@ -2,6 +2,7 @@
 
 #include <openvdb/openvdb.h>
 
+#include "ops/kernels/leaf_surroundings.h"
 #include "vdbdither/lattice.h"
 
 namespace vdbdither {
@@ -35,9 +36,10 @@ class WallGuard {
             ZRange valid)
       : surface_(surface), pitch_mm_(pitch_mm), background_mm_(background_mm), valid_(valid) {}
 
-  /// Whether the voxel at `ijk`, at the distance `d_mm` from a face with this normal, may be
-  /// overturned.
-  [[nodiscard]] bool allows(const openvdb::Coord& ijk, const openvdb::Vec3s& normal, float d_mm);
+  /// Whether the voxel at `offset` in the leaf that `around` is about, at the distance `d_mm` from
+  /// a face with this normal, may be overturned. `origin`: the leaf's.
+  [[nodiscard]] bool allows(const LeafSurroundings& around, const openvdb::Coord& origin,
+                            unsigned offset, const openvdb::Vec3s& normal, float d_mm);
 
   /// How many layers away a sample may be, for displacements up to ½·amplitude·k_D.
   static int reachLayers(double amplitude) {
@@ -45,8 +47,8 @@ class WallGuard {
   }
 
  private:
-  /// How far a voxel is from the surface on the side of positive distances (1) or negative (−1).
-  double distance(const openvdb::Coord& ijk, int side, double band_mm);
+  /// d of a voxel; infinite where it has none.
+  double distance(const openvdb::Coord& ijk);
 
   openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> surface_;
   openvdb::Vec3d pitch_mm_;

@@ -34,7 +34,7 @@ def methods(folder):
     for sigma in ("1.1", "2.5"):
         masks[sigma] = folder / f"blue-{sigma}.vdb"
         subprocess.run(["vdbdither", "mask", "--size", "128", "--sigma", sigma, "-o", masks[sigma], "--quiet"], check=True)
-    paper = "dither --amplitude 4 --at closest --mask"
+    paper = "dither --preset paper --mask"
     return {
         CONTROL: ([], "dither --mask none"),
         "interlacing": (["--refine-y", "2"], "interlace"),

@@ -106,14 +106,21 @@ class Words(ProgramTest):
         self.assertTrue(shown[()].endswith(b"\r\x1b[K"), "the bar is wiped away")
         self.assertEqual(shown[("--quiet",)], b"")
 
+    def test_a_long_run_tells_a_terminal_at_once_how_long_it_may_take(self):
+        meshes.write_stl(self.folder / "ball.stl", meshes.sphere(4))
+        self.succeed("mesh2sdf", "ball.stl", *MIMAKI, "-o", "surface.vdb")
+        ours, theirs = pty.openpty()
+        process = self.start("resample", "surface.vdb", *MIMAKI, "-o", "again.vdb", "--threads", "1", stderr=theirs)
+        os.close(theirs)
+        shown = read_terminal(ours)
+        self.assertEqual(process.wait(), 0)
+        self.assertRegex(shown, rb"^\r\x1b\[K +0 %  about 0:0[1-9] left\r")
+
 
 class Refusals(ProgramTest):
     def setUp(self):
         super().setUp()
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.6))
-
-    def test_no_arguments_point_to_help(self):
-        self.refuse(2, "vdbdither --help")
 
     def test_an_unknown_operator_names_the_nearest(self):
         self.refuse(2, "no operator 'normal'; did you mean 'normals'?", "mesh2sdf", "part.stl", *MIMAKI, "!", "normal")

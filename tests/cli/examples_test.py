@@ -1,8 +1,11 @@
 """Every example runs: those in the help, and the commands that README.md and docs show."""
 
+import os
 import re
 import shutil
+import subprocess
 import unittest
+import unittest.mock
 
 import meshes
 from program import PROGRAM, ROOT, ProgramTest
@@ -51,6 +54,26 @@ class Documents(ProgramTest):
                         self.shell(line)
                     ran += 1
         self.assertGreater(ran, 15)
+
+    def test_the_python_node_for_houdini_runs_with_a_stand_in_for_houdini(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
+        table, node = re.findall(r"```python\n(.*?)```", (ROOT / "docs/houdini.md").read_text(), re.DOTALL)
+        hou = unittest.mock.MagicMock()
+        hou.NodeError = RuntimeError
+        hou.text.expandString.return_value = str(self.folder)
+        parameters = {"mesh": str(self.folder / "part.stl"), "chain": "--printer mimaki-3duj-553 ! dither ! material-assign"}
+        hou.pwd().evalParm.side_effect = parameters.get
+        with unittest.mock.patch.dict(os.environ, self.environment()):
+            exec(node, {"hou": hou})
+            loaded, = hou.pwd().geometry().loadFromFile.call_args.args
+            shutil.copy(loaded, self.folder / "part.vdb")
+            told = subprocess.run(["python3", "-c", table + "print(names)"], cwd=self.folder, capture_output=True, text=True)
+            self.assertEqual((told.returncode, told.stdout), (0, "{1: 'white'}\n"), told.stderr)
+            before = self.listing()
+            parameters["chain"] = "--printer mimaki-3duj-553 ! dihter"
+            with self.assertRaisesRegex(RuntimeError, "^vdbdither: no operator 'dihter'; did you mean 'dither'[?]$"):
+                exec(node, {"hou": hou})
+        self.assertEqual(self.listing(), before)
 
 
 if __name__ == "__main__":

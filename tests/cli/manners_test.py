@@ -46,6 +46,81 @@ class Manners(ProgramTest):
             used = sum(file.stat().st_blocks * 512 for file in files)
             self.assertTrue(0.4 < expected / used < 2.5, (used, said))
 
+    def explained(self, chain):
+        """What --explain says about memory, time and disk."""
+        said = self.succeed("run", f"{chain} --explain").decode()
+        return dict(re.findall(r"(?m)^(memory|time|disk) +(.*)$", said))
+
+    def test_explain_tells_time_and_disk_behind_every_source_that_knows_its_size(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
+        self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! dither ! write solid.vdb "
+                            "! slice-export stack")
+        for chain in ("mesh2sdf part.stl --printer mimaki-3duj-553 ! dither -o x.vdb", "read surface.vdb ! dither -o x.vdb",
+                      "dither -i surface.vdb -o x.vdb", "read solid.vdb ! material-assign -o x.vdb",
+                      "resample surface.vdb --printer mimaki-3duj-553 ! dither -o x.vdb", "slice-import stack -o x.vdb",
+                      "read surface.vdb ! csg --union surface.vdb -o x.vdb"):
+            with self.subTest(chain=chain):
+                told = self.explained(chain)
+                self.assertRegex(told["disk"], r"^about \d[\d.]* (KiB|MiB) of ")
+                self.assertRegex(told["time"], r"^about \d+\.\d s on \d+ threads?$")
+
+    def test_disk_behind_a_file_or_a_stack_is_told_within_a_factor(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(6, 60))
+        self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! write job.vdb ! slice-export stack")
+        for chain in ("read job.vdb", "slice-import stack", "resample job.vdb --printer mimaki-3duj-553"):
+            with self.subTest(chain=chain):
+                expected, unit = re.match(r"about ([\d.]+) (\w+) of", self.explained(f"{chain} -o x.vdb --overwrite")["disk"]).groups()
+                self.succeed("run", f"{chain} -o x.vdb --overwrite")
+                used = (self.folder / "x.vdb").stat().st_size
+                self.assertTrue(0.3 < float(expected) * {"KiB": 2**10, "MiB": 2**20}[unit] / used < 3, (expected, unit, used))
+
+    def test_explain_says_what_it_does_not_know(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
+        self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 -o surface.vdb")
+        self.assertRegex(self.explained("read surface.vdb ! dither ! measure --reference part.stl")["time"], "^unknown of measure$")
+        piped = self.succeed("read", "surface.vdb")
+        said = self.succeed("dither", "-o", "x.vdb", "--explain", input=piped).decode()
+        self.assertRegex(said, r"(?m)^time +unknown of read, dither, write$")
+        self.assertRegex(said, r"(?m)^disk +unknown of .* for x\.vdb$")
+
+    def test_json_tells_what_was_expected_beside_what_came(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
+        told = json.loads(self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! slice-export out "
+                                              "--threads 1 --json"))
+        self.assertAlmostEqual(told["expected_seconds"], sum(stage["expected_cpu_seconds"] for stage in told["stages"]))
+        half = json.loads(self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 --threads 1 ! dither "
+                                              "! slice-export half --layers 0:80 --json"))
+        for stage, whole in zip(half["stages"], told["stages"]):
+            self.assertLess(stage["expected_cpu_seconds"], whole["expected_cpu_seconds"], stage["name"])
+
+    def test_a_name_of_another_format_is_not_given_to_a_vdb(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
+        self.refuse(2, "write: 'x.stl' is a mesh by its name, and this is a .vdb; mesh-export writes meshes",
+                    "mesh2sdf", "part.stl", *MIMAKI, "-o", "x.stl")
+        self.refuse(2, "write: 'x.png' holds pictures by its name", "mesh2sdf", "part.stl", *MIMAKI, "-o", "x.png")
+        self.refuse(1, "'part.stl' is not a readable VDB archive: it is a file of another kind; meshes come in by mesh2sdf",
+                    "dither", "-i", "part.stl", "-o", "x.vdb")
+
+    def test_what_is_forgotten_is_named(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
+        self.refuse(2, "slice-export: no folder is given; see --help", "mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!",
+                    "slice-export")
+        self.refuse(2, "mesh2sdf: no mesh is given; see --help", "mesh2sdf", *MIMAKI)
+        (self.folder / "part.vdb").write_bytes(b"anything")
+        self.refuse(1, "mesh2sdf: 'part.vdb': a .vdb is no mesh; read takes one of this lattice, resample any other",
+                    "mesh2sdf", "part.vdb", *MIMAKI, "-o", "x.vdb")
+
+    def test_a_length_below_zero_is_refused(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
+        self.refuse(2, "mesh2sdf: --fit: -3 mm is below zero", "mesh2sdf", "part.stl", *MIMAKI, "--fit", "-3", "-o", "x.vdb")
+
+    def test_a_call_without_words_shows_what_there_is(self):
+        done = self.run_program()
+        self.assertEqual((done.returncode, done.stdout), (2, b""))
+        said = done.stderr.decode()
+        self.assertTrue(said.startswith(self.succeed("--help").decode()))
+        self.assertTrue(said.endswith("vdbdither: there is no operator\n"))
+
     def test_what_does_not_fit_on_the_disk_is_refused_before_the_run(self):
         disk = self.folder / "disk"
         disk.mkdir()

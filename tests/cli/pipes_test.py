@@ -121,7 +121,7 @@ class Stops(ProgramTest):
             process.send_signal(number)
             said = process.communicate()[1].decode()
             self.assertEqual(process.returncode, 128 + number)
-            self.assertRegex(said, r"^vdbdither .*stopped: \w+\n$")
+            self.assertRegex(said, r"^vdbdither.*: stopped: \w+\n$")
             self.assertEqual(self.listing(), self.inputs)
 
     def test_who_waits_for_a_pipe_can_be_stopped(self):

@@ -44,7 +44,7 @@ class Printers(ProgramTest):
 
     def test_what_is_no_action_is_told(self):
         self.refuse(2, "printers: action: 'sell' is none of list, show, check", "printers", "sell")
-        self.refuse(2, "printers: printer is missing", "printers", "show")
+        self.refuse(2, "printers: no printer is given", "printers", "show")
         self.refuse(2, "no operator or command 'printer'; did you mean 'printers'?", "printer")
 
 

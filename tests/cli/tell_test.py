@@ -93,21 +93,72 @@ class Tell(ProgramTest):
         self.assertEqual(self.succeed("compare", "part.vdb", "pipe.vdb"), b"equal\n")
         self.assertEqual(writer.wait(), 0)
 
-    def test_grids_of_other_lattices_are_no_hindrance_when_they_are_not_wanted(self):
+    def foreign(self, name, grids):
+        """A .vdb of another tool: name, kind and transform of each grid."""
         try:
             import pyopenvdb
         except ImportError:
             self.skipTest("pyopenvdb is not installed")
-        grids = []
-        for name, size in (("coarse", 2.0), ("fine", 1.0)):
-            grid = pyopenvdb.FloatGrid()
-            grid.name = name
-            grid.transform = pyopenvdb.createLinearTransform(size)
-            grid.fill((0, 0, 0), (9, 9, 9), 1.5)
-            grids.append(grid)
-        pyopenvdb.write(str(self.folder / "mixed.vdb"), grids)
-        self.refuse(1, "grids 'coarse' and 'fine' lie on different lattices", "info", "mixed.vdb")
+        made = []
+        for grid_name, kind, transform in grids:
+            grid = getattr(pyopenvdb, kind)()
+            grid.name = grid_name
+            grid.transform = transform(pyopenvdb)
+            grid.fill((0, 0, 0), (9, 9, 9), (1, 0, 0) if "Vec" in kind else True if "Bool" in kind else 1.5)
+            made.append(grid)
+        pyopenvdb.write(str(self.folder / name), made)
+
+    @staticmethod
+    def cubes(size):
+        return lambda vdb: vdb.createLinearTransform(size)
+
+    @staticmethod
+    def turned(vdb):
+        return vdb.createLinearTransform([[0, 0.1, 0, 0], [-0.1, 0, 0, 0], [0, 0, 0.2, 0], [5, 0, 0, 1]])
+
+    @staticmethod
+    def frustum(vdb):
+        return vdb.createFrustumTransform((0, 0, 0), (9, 9, 9), 0.5, 1, 0.1)
+
+    def test_grids_of_other_lattices_are_no_hindrance_when_they_are_not_wanted(self):
+        self.foreign("mixed.vdb", [("coarse", "FloatGrid", self.cubes(2.0)), ("fine", "FloatGrid", self.cubes(1.0))])
+        self.refuse(1, "grids 'coarse' and 'fine' lie on different lattices", "read", "mixed.vdb", "!", "info")
         self.assertIn("fine      float: 1000 voxels", self.succeed("run", "read mixed.vdb --grids fine ! info").decode())
+
+    def test_info_describes_grids_of_different_lattices_one_by_one(self):
+        self.foreign("mixed.vdb", [("coarse", "FloatGrid", self.cubes(2.0)), ("fine", "BoolGrid", self.cubes(1.0))])
+        told = self.succeed("info", "mixed.vdb").decode()
+        self.assertRegex(told, r"^the grids lie on no common lattice; each by itself:\n"
+                               r"coarse    float: 1000 voxels from 0 0 0 to 9 9 9, values 1\.5 to 1\.5, .* leaves\n"
+                               r"          voxels of 2 x 2 x 2\n"
+                               r"          vdbdither resample mixed\.vdb --grid coarse --printer NAME\n"
+                               r"          vdbdither read mixed\.vdb --grids coarse\n"
+                               r"fine      bool: 1000 voxels")
+        grids = {grid["name"]: grid for grid in json.loads(self.succeed("info", "mixed.vdb", "--json"))["grids"]}
+        self.assertEqual(grids["fine"]["takers"], ["read mixed.vdb --grids fine"])
+        self.assertEqual((grids["coarse"]["place"], grids["coarse"]["voxel_size"]), ("plain", [2, 2, 2]))
+
+    def test_info_describes_turned_grids_and_what_takes_them_does(self):
+        self.foreign("turned.vdb", [("density", "FloatGrid", self.turned), ("v", "Vec3SGrid", self.turned)])
+        told = self.succeed("info", "turned.vdb").decode()
+        self.assertIn("          voxels of 0.1 x 0.1 x 0.2, turned, mirrored or sheared: x y z of index i j k are\n"
+                      "            0 -0.1 0 5\n", told)
+        self.assertIn("only numbers (float, double) are brought from a turned lattice", told)
+        density = json.loads(self.succeed("info", "turned.vdb", "--json"))["grids"][0]
+        self.assertEqual((density["place"], density["matrix"][0]), ("affine", [0, -0.1, 0, 5]))
+        command, = density["takers"]
+        self.succeed("run", command.replace("NAME", "mimaki-3duj-553") + " --kind fog -o part.vdb --overwrite")
+        self.refuse(1, "is turned or sheared; resample --grid ", "read", "turned.vdb", "!", "info")
+
+    def test_info_says_that_nothing_takes_a_frustum(self):
+        self.foreign("camera.vdb", [("density", "FloatGrid", self.frustum)])
+        told = self.succeed("info", "camera.vdb").decode()
+        self.assertRegex(told, r"^density   float: 1000 voxels from 0 0 0 to 9 9 9, .*\n"
+                               r"          voxels of .* in the middle of a frustum\n"
+                               r"          no operator takes a frustum; resample it in the tool that it comes from\n$")
+        grid, = json.loads(self.succeed("info", "camera.vdb", "--json"))["grids"]
+        self.assertEqual((grid["place"], grid["takers"]), ("frustum", []))
+        self.refuse(1, "grid 'density' lies in a frustum", "read", "camera.vdb", "!", "info")
 
 
 if __name__ == "__main__":

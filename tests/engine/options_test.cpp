@@ -80,7 +80,7 @@ TEST(Options, RefusalsSayWhatWouldHaveBeenAccepted) {
   EXPECT_EQ(refusal(example.options, {"a", "--rotate", "1,2"}),
             "--rotate: '1,2' is not three numbers such as 0,45,90, or one for all three");
   EXPECT_EQ(refusal(example.options, {"a", "b"}), "unexpected argument 'b'; see --help");
-  EXPECT_EQ(refusal(Example().options, {}), "file is missing; see --help");
+  EXPECT_EQ(refusal(Example().options, {}), "no file is given; see --help");
 }
 
 TEST(Options, UnknownOptionNamesTheNearest) {

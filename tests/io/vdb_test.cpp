@@ -150,10 +150,12 @@ TEST_F(Vdb, TurnedAndUnlikeGridsAreRefused) {
   const auto turned = openvdb::FloatGrid::create(1);
   turned->transform().postRotate(0.3);
   turned->setName("t");
-  EXPECT_EQ(refusal([&] {
-              schemaOf({{{"t", turned}}, {}}, "it");
-            }),
-            "it: grid 't' is turned or sheared; bring it onto the printer's lattice first");
+  EXPECT_EQ(
+      refusal([&] {
+        schemaOf({{{"t", turned}}, {}}, "it");
+      }),
+      "it: grid 't' is turned or sheared; resample --grid t brings numbers onto the printer's "
+      "lattice");
   const auto cubes = openvdb::FloatGrid::create(1);
   contents.grids["cubes"] = cubes;
   EXPECT_NE(refusal([&] { schemaOf(contents, "it"); }).find("lie on different lattices"),

@@ -15,24 +15,6 @@ using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using openvdb::Vec3d;
 
-const std::vector<Vec3d> lattices{
-    {0.042, 0.084, 0.022}, {0.04233, 0.08467, 0.027}, {0.05, 0.05, 0.05}};
-
-struct Shape {
-  const char* name;
-  test::Distance distance;
-  Vec3d extent;
-};
-
-const std::vector<Shape> shapes{
-    {"sphere", test::sphere({0.013, -0.02, 0.007}, 0.4), Vec3d(0.43)},
-    {"tilted box", test::box(Vec3d(0.0), {0.4, 0.3, 0.25}, {12, 25, 31}), Vec3d(0.6)},
-    {"torus", test::torus({0.01, 0.01, 0}, 0.4, 0.15), {0.57, 0.57, 0.16}},
-    {"thin plate",
-     test::box({0.001, 0.002, 0.003}, {0.4, 0.4, 0.03}, {5, -4, 0}),
-     {0.45, 0.45, 0.12}},
-};
-
 /// ∂V of a tree as a set, and as what the search walks over.
 FloatTree surfaceVoxelTree(const FloatTree& surface, ZRange valid) {
   FloatTree marked(0.0F);
@@ -64,9 +46,9 @@ void compareWithBruteForce(const FloatTree& marked, const std::vector<Coord>& li
 }
 
 TEST(SurfaceVoxels, AreTheVoxelsInsideWithAFaceNeighbourOutside) {
-  for (const Vec3d& pitch_mm : lattices) {
-    for (const Shape& shape : shapes) {
-      const Lattice lattice = test::latticeAround(pitch_mm, shape.extent, 0.1);
+  for (const Vec3d& pitch_mm : test::testPitches()) {
+    for (const test::TestShape& shape : test::testShapes()) {
+      const Lattice lattice = test::latticeAround(pitch_mm, shape.extent_mm, 0.1);
       const auto surface = test::sampled(shape.distance, lattice, 0.2);
       const FloatTree marked = surfaceVoxelTree(surface->tree(), lattice.layers());
       const auto expected =
@@ -93,16 +75,16 @@ TEST(SurfaceVoxels, LayersThatAreNotThereAreOutside) {
 }
 
 TEST(ClosestSurfaceVoxel, EqualsBruteForceOnShapes) {
-  for (const Vec3d& pitch_mm : lattices) {
-    for (const Shape& shape : shapes) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
+    for (const test::TestShape& shape : test::testShapes()) {
       SCOPED_TRACE(shape.name);
-      const Lattice lattice = test::latticeAround(pitch_mm, shape.extent, 0.1);
+      const Lattice lattice = test::latticeAround(pitch_mm, shape.extent_mm, 0.1);
       const auto surface = test::sampled(shape.distance, lattice, 0.2);
       const FloatTree marked = surfaceVoxelTree(surface->tree(), lattice.layers());
       const auto listed =
           test::listed(test::surfaceVoxels(test::plainVoxels(test::dense(*surface, lattice.box))));
-      // An eighth of the box: the shapes are large enough that every kind of neighbourhood is in
-      // it.
+      // An eighth of the box: the shapes are large enough that every kind of
+      // neighbourhood is in it.
       compareWithBruteForce(marked, listed, CoordBBox(lattice.box.min(), Coord(0)), pitch_mm,
                             2 * pitch_mm.length());
     }

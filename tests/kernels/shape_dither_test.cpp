@@ -23,24 +23,6 @@ using openvdb::Vec3d;
 using test::components;
 using test::Touching;
 
-const std::vector<Vec3d> lattices{
-    {0.042, 0.084, 0.022}, {0.04233, 0.08467, 0.027}, {0.05, 0.05, 0.05}};
-
-struct Shape {
-  const char* name;
-  test::Distance distance;
-  Vec3d extent;
-};
-
-const std::vector<Shape> shapes{
-    {"sphere", test::sphere({0.013, -0.02, 0.007}, 0.4), Vec3d(0.43)},
-    {"tilted box", test::box(Vec3d(0.0), {0.35, 0.3, 0.2}, {12, 25, 31}), Vec3d(0.5)},
-    {"torus", test::torus({0.01, 0.01, 0}, 0.35, 0.15), {0.52, 0.52, 0.16}},
-    {"thin plate",
-     test::box({0.001, 0.002, 0.003}, {0.4, 0.4, 0.03}, {5, -4, 0}),
-     {0.45, 0.45, 0.12}},
-};
-
 /// A tile of ranks in random order: every threshold (rank + ½) / n once.
 ThresholdMask permutationMask(int size) {
   std::vector<float> values(static_cast<std::size_t>(size * size * size));
@@ -84,8 +66,8 @@ test::Volume<double> referenceDisplaced(const ShapeDither& dither, const FloatGr
   return displaced;
 }
 
-void compareWithReference(const ShapeDither& dither, const Shape& shape) {
-  const Lattice lattice = test::latticeAround(dither.pitch_mm, shape.extent, 0.15);
+void compareWithReference(const ShapeDither& dither, const test::TestShape& shape) {
+  const Lattice lattice = test::latticeAround(dither.pitch_mm, shape.extent_mm, 0.15);
   const auto surface = test::sampled(shape.distance, lattice, bandFor(dither));
   const auto expected = referenceDisplaced(dither, *surface, lattice.box);
   const auto result = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), true);
@@ -109,8 +91,8 @@ void compareWithReference(const ShapeDither& dither, const Shape& shape) {
 
 TEST(ShapeDither, EqualsTheEquationsInDoublePrecision) {
   const ThresholdMask mask = permutationMask(16);
-  for (const Vec3d& pitch_mm : lattices) {
-    for (const Shape& shape : shapes) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
+    for (const test::TestShape& shape : test::testShapes()) {
       for (const DitherAt at : {DitherAt::closest, DitherAt::foot, DitherAt::voxel}) {
         for (const double amplitude : {2.0, 4.0}) {
           SCOPED_TRACE(std::string(shape.name) + " at " + std::to_string(static_cast<int>(at)));
@@ -122,15 +104,16 @@ TEST(ShapeDither, EqualsTheEquationsInDoublePrecision) {
 }
 
 TEST(ShapeDither, EqualsTheEquationsAtTheLargestAmplitudeAndWithWhiteNoise) {
-  for (const Shape& shape : shapes)
-    compareWithReference({lattices[0], 8, DitherAt::closest, ThresholdMask::whiteNoise(3)}, shape);
+  for (const test::TestShape& shape : test::testShapes())
+    compareWithReference(
+        {test::testPitches()[0], 8, DitherAt::closest, ThresholdMask::whiteNoise(3)}, shape);
 }
 
 TEST(ShapeDither, MakesTheSameOfGivenNormalsAsOfItsOwn) {
-  const Lattice lattice = test::latticeAround(lattices[0], Vec3d(0.5), 0.15);
+  const Lattice lattice = test::latticeAround(test::testPitches()[0], Vec3d(0.5), 0.15);
   for (const DitherAt at : {DitherAt::closest, DitherAt::foot, DitherAt::voxel}) {
     const ShapeDither dither{lattice.pitch_mm, 4, at, permutationMask(16)};
-    const auto surface = test::sampled(shapes[1].distance, lattice, bandFor(dither));
+    const auto surface = test::sampled(test::testShapes()[1].distance, lattice, bandFor(dither));
     const auto normals =
         outwardNormals(*surface, lattice.pitch_mm, lattice.layers(), lattice.layers());
     const auto with = dither.run(*surface, normals.get(), lattice.layers(), lattice.layers(), true);
@@ -142,11 +125,11 @@ TEST(ShapeDither, MakesTheSameOfGivenNormalsAsOfItsOwn) {
 }
 
 TEST(ShapeDither, AtTheVoxelIsTheThresholdedTonalValue) {
-  for (const Vec3d& pitch_mm : lattices) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
     for (const double amplitude : {2.0, 4.0}) {
       const ShapeDither dither{pitch_mm, amplitude, DitherAt::voxel, permutationMask(16)};
       const Lattice lattice = test::latticeAround(pitch_mm, Vec3d(0.5), 0.15);
-      const auto surface = test::sampled(shapes[1].distance, lattice, bandFor(dither));
+      const auto surface = test::sampled(test::testShapes()[1].distance, lattice, bandFor(dither));
       const auto result = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), false);
       for (auto voxel = surface->cbeginValueOn(); voxel; ++voxel) {
         const Coord v = voxel.getCoord();
@@ -196,9 +179,9 @@ TEST(ShapeDither, KeepsTheMeanHeightOfAnAxisParallelPlane) {
     for (const double amplitude : {2.0, 4.0}) {
       for (int axis = 0; axis < 3; ++axis) {
         for (const double offset : {0.0, 0.13, 0.37, 0.5, 0.71, 0.94}) {
-          EXPECT_NEAR(
-              meanHeightError({lattices[0], amplitude, at, permutationMask(8)}, axis, offset), 0,
-              0.01)
+          EXPECT_NEAR(meanHeightError({test::testPitches()[0], amplitude, at, permutationMask(8)},
+                                      axis, offset),
+                      0, 0.01)
               << "amplitude " << amplitude << " axis " << axis << " offset " << offset;
         }
       }
@@ -207,7 +190,7 @@ TEST(ShapeDither, KeepsTheMeanHeightOfAnAxisParallelPlane) {
 }
 
 TEST(ShapeDither, ShiftsTheMeanHeightByUpToAQuarterVoxelAtTheConstantOne) {
-  const ShapeDither dither{lattices[0], 1, DitherAt::closest, permutationMask(8)};
+  const ShapeDither dither{test::testPitches()[0], 1, DitherAt::closest, permutationMask(8)};
   EXPECT_NEAR(std::max(std::abs(meanHeightError(dither, 2, 0.25)),
                        std::abs(meanHeightError(dither, 2, 0.75))),
               0.25, 0.01);
@@ -219,20 +202,20 @@ struct Printed {
   test::Voxels dithered;
 };
 
-Printed printed(const ShapeDither& dither, const Shape& shape) {
-  const Lattice lattice = test::latticeAround(dither.pitch_mm, shape.extent, 0.3);
+Printed printed(const ShapeDither& dither, const test::TestShape& shape) {
+  const Lattice lattice = test::latticeAround(dither.pitch_mm, shape.extent_mm, 0.3);
   const auto surface = test::sampled(shape.distance, lattice, bandFor(dither));
   const auto result = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), false);
   return {test::plainVoxels(test::dense(*surface, lattice.box)),
           test::dense(*result.solid, lattice.box)};
 }
 
-const Shape ball{"ball", test::sphere({0.013, -0.02, 0.007}, 1.2), Vec3d(1.2)};
-const Shape ring{"ring", test::torus({0.01, 0.01, 0}, 0.8, 0.4), {1.2, 1.2, 0.4}};
+const test::TestShape ball{"ball", test::sphere({0.013, -0.02, 0.007}, 1.2), Vec3d(1.2)};
+const test::TestShape ring{"ring", test::torus({0.01, 0.01, 0}, 0.8, 0.4), {1.2, 1.2, 0.4}};
 
 TEST(ShapeDither, LeavesNoFloatingVoxelsAtTheClosestSurfaceVoxelOrTheFoot) {
-  for (const Vec3d& pitch_mm : lattices) {
-    for (const Shape& shape : {ball, ring}) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
+    for (const test::TestShape& shape : {ball, ring}) {
       for (const DitherAt at : {DitherAt::closest, DitherAt::foot}) {
         const Printed voxels = printed({pitch_mm, 4, at, ThresholdMask::whiteNoise(1)}, shape);
         EXPECT_EQ(components(voxels.plain, Touching::corners), 1);
@@ -246,7 +229,7 @@ TEST(ShapeDither, LeavesNoFloatingVoxelsAtTheClosestSurfaceVoxelOrTheFoot) {
 TEST(ShapeDither, HangsVoxelsOnNoFaceAtTheVoxelItselfButHardlyAnyAtTheClosestSurfaceVoxel) {
   const auto hanging = [](double amplitude, DitherAt at) {
     const Printed voxels =
-        printed({lattices[0], amplitude, at, ThresholdMask::whiteNoise(1)}, ball);
+        printed({test::testPitches()[0], amplitude, at, ThresholdMask::whiteNoise(1)}, ball);
     return components(voxels.dithered, Touching::faces) - 1;
   };
   EXPECT_GT(hanging(4, DitherAt::voxel), 100);
@@ -263,7 +246,7 @@ struct Disagreement {
 
 Disagreement disagreement(const Vec3d& pitch_mm, double amplitude, DitherAt a, DitherAt b) {
   const ThresholdMask mask = permutationMask(16);
-  const Lattice lattice = test::latticeAround(pitch_mm, ball.extent, 0.3);
+  const Lattice lattice = test::latticeAround(pitch_mm, ball.extent_mm, 0.3);
   const auto surface =
       test::sampled(ball.distance, lattice, bandFor({pitch_mm, amplitude, a, mask}));
   const auto solid = [&](DitherAt at) {
@@ -287,7 +270,7 @@ Disagreement disagreement(const Vec3d& pitch_mm, double amplitude, DitherAt a, D
 }
 
 TEST(ShapeDither, AtTheConstantTwoTheFootLiesInTheVoxelItself) {
-  for (const Vec3d& pitch_mm : lattices) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
     const Disagreement foot = disagreement(pitch_mm, 2, DitherAt::voxel, DitherAt::foot);
     EXPECT_LT(foot.inside, 1e-3);
     EXPECT_LT(foot.outside, 1e-3);
@@ -295,7 +278,7 @@ TEST(ShapeDither, AtTheConstantTwoTheFootLiesInTheVoxelItself) {
 }
 
 TEST(ShapeDither, AtTheConstantTwoAVoxelInsideIsItsOwnClosestSurfaceVoxel) {
-  for (const Vec3d& pitch_mm : lattices) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
     const Disagreement closest = disagreement(pitch_mm, 2, DitherAt::voxel, DitherAt::closest);
     EXPECT_LT(closest.inside, 0.005);
     // One outside is never: it reads another threshold, as random as its own.
@@ -304,14 +287,15 @@ TEST(ShapeDither, AtTheConstantTwoAVoxelInsideIsItsOwnClosestSurfaceVoxel) {
 }
 
 TEST(ShapeDither, AtTheConstantFourAboutAFifthOfTheBandDependsOnWhereTheMaskIsRead) {
-  for (const Vec3d& pitch_mm : lattices) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
     const Disagreement closest = disagreement(pitch_mm, 4, DitherAt::voxel, DitherAt::closest);
     EXPECT_NEAR((closest.inside + closest.outside) / 2, 0.19, 0.03);
   }
 }
 
 TEST(ShapeDither, IsPlainVoxelizationWithoutAmplitude) {
-  const Printed voxels = printed({lattices[0], 0, DitherAt::closest, permutationMask(8)}, ring);
+  const Printed voxels =
+      printed({test::testPitches()[0], 0, DitherAt::closest, permutationMask(8)}, ring);
   EXPECT_EQ(voxels.plain, voxels.dithered);
 }
 
@@ -373,11 +357,11 @@ bool referenceGuard(const FloatGrid& surface, const Coord& v, const Vec3d& norma
 TEST(ShapeDither, AdaptedAndGuardedEqualsItsDefinitionInDoublePrecision) {
   int all_spared = 0;
   int all_overturned = 0;
-  for (const Vec3d& pitch_mm : lattices) {
-    for (const Shape& shape : shapes) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
+    for (const test::TestShape& shape : test::testShapes()) {
       SCOPED_TRACE(shape.name);
       const ShapeDither dither = bestOn(pitch_mm);
-      const Lattice lattice = test::latticeAround(pitch_mm, shape.extent, 0.15);
+      const Lattice lattice = test::latticeAround(pitch_mm, shape.extent_mm, 0.15);
       const auto surface = test::sampled(shape.distance, lattice, bandFor(dither));
       const auto normals = outwardNormals(*surface, pitch_mm, lattice.layers(), lattice.layers());
       const auto result =
@@ -414,8 +398,8 @@ TEST(ShapeDither, AdaptedAndGuardedEqualsItsDefinitionInDoublePrecision) {
 }
 
 TEST(ShapeDither, TheGuardChangesNothingOnASurfaceThatIsThickEverywhere) {
-  for (const Vec3d& pitch_mm : lattices) {
-    for (const Shape& shape : {ball, ring})
+  for (const Vec3d& pitch_mm : test::testPitches()) {
+    for (const test::TestShape& shape : {ball, ring})
       EXPECT_EQ(printed(bestOn(pitch_mm), shape).dithered,
                 printed(bestOn(pitch_mm, false), shape).dithered);
   }
@@ -423,7 +407,7 @@ TEST(ShapeDither, TheGuardChangesNothingOnASurfaceThatIsThickEverywhere) {
 
 // But for single voxels where facets of the mesh meet at the edge of the band.
 TEST(ShapeDither, TheGuardNeedsNoWiderBandThanOneDiameter) {
-  for (const Vec3d& pitch_mm : lattices) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
     for (const Mesh& mesh : {test::sphereMesh({0.013, -0.02, 0.007}, 1.2, 60),
                              test::transformed(test::torusMesh(Vec3d(0.0), 0.8, 0.4, 80),
                                                {20, 35, 10}, Vec3d(0.01))}) {
@@ -442,10 +426,10 @@ TEST(ShapeDither, TheGuardNeedsNoWiderBandThanOneDiameter) {
 }
 
 TEST(ShapeDither, AxisAlignedFacetsOnLatticePlanesAreNotDithered) {
-  for (const Vec3d& pitch_mm : lattices) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
     // Faces half way between the centres of voxels.
     const Vec3d half(8.5 * pitch_mm.x(), 5.5 * pitch_mm.y(), 11.5 * pitch_mm.z());
-    const Shape block{"block", test::box(Vec3d(0.0), half), half};
+    const test::TestShape block{"block", test::box(Vec3d(0.0), half), half};
     const Printed voxels = printed(bestOn(pitch_mm), block);
     EXPECT_EQ(voxels.dithered, voxels.plain);
   }
@@ -500,16 +484,16 @@ Vec3d turnedZ(const Vec3d& degrees) {
 
 TEST(ShapeDither, ThinWallsAreNotOpened) {
   int checked = 0;
-  for (const Vec3d& pitch_mm : lattices) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
     for (const Vec3d& degrees : plate_angles) {
       const Vec3d normal = turnedZ(degrees);
       const double diameter = 2 * test::halfDiameter(normal, pitch_mm);
       for (const double voxels : {1.0, 1.3, 1.7, 2.0, 2.5, 3.0, 4.0}) {
         const double thickness = voxels * diameter;
-        const Shape plate{"plate",
-                          test::box({0.003, 0.004, 0.005}, {0.6, 0.5, thickness / 2}, degrees),
-                          Vec3d(0.75)};
-        const Lattice lattice = test::latticeAround(pitch_mm, plate.extent, 0.3);
+        const test::TestShape plate{
+            "plate", test::box({0.003, 0.004, 0.005}, {0.6, 0.5, thickness / 2}, degrees),
+            Vec3d(0.75)};
+        const Lattice lattice = test::latticeAround(pitch_mm, plate.extent_mm, 0.3);
         const test::Distance inside =
             test::box({0.003, 0.004, 0.005}, {0.4, 0.3, thickness / 2 + 3 * diameter}, degrees);
         const auto beyond = [&](double side) {
@@ -529,9 +513,10 @@ TEST(ShapeDither, ThinWallsAreNotOpened) {
 }
 
 TEST(ShapeDither, OpensThinWallsWithoutTheGuard) {
-  const Vec3d pitch_mm = lattices[0];
-  const Shape plate{"plate", test::box(Vec3d(0.0), {0.6, 0.5, 0.016}, {3, 4, 0}), Vec3d(0.75)};
-  const Lattice lattice = test::latticeAround(pitch_mm, plate.extent, 0.3);
+  const Vec3d pitch_mm = test::testPitches()[0];
+  const test::TestShape plate{"plate", test::box(Vec3d(0.0), {0.6, 0.5, 0.016}, {3, 4, 0}),
+                              Vec3d(0.75)};
+  const Lattice lattice = test::latticeAround(pitch_mm, plate.extent_mm, 0.3);
   const test::Distance inside = test::box(Vec3d(0.0), {0.4, 0.3, 0.1}, {3, 4, 0});
   const auto above = [](const Vec3d& at) { return 0.07 - at.z(); };
   const auto below = [](const Vec3d& at) { return 0.07 + at.z(); };
@@ -545,7 +530,7 @@ TEST(ShapeDither, OpensThinWallsWithoutTheGuard) {
 TEST(ShapeDither, NoBarsFuse) {
   int checked = 0;
   int fused_at_ends = 0;
-  for (const Vec3d& pitch_mm : lattices) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
     for (const Vec3d& degrees : plate_angles) {
       const Vec3d normal = turnedZ(degrees);
       const double diameter = 2 * test::halfDiameter(normal, pitch_mm);
@@ -554,17 +539,17 @@ TEST(ShapeDither, NoBarsFuse) {
         std::vector<test::Distance> bars;
         for (int n = -1; n <= 1; ++n)
           bars.push_back(test::box(n * step * normal, {0.4, 0.35, 1.3 * diameter}, degrees));
-        const Shape comb{"comb",
-                         [=](const Vec3d& at) {
-                           return std::min({bars[0](at), bars[1](at), bars[2](at)});
-                         },
-                         Vec3d(1.0)};
+        const test::TestShape comb{"comb",
+                                   [=](const Vec3d& at) {
+                                     return std::min({bars[0](at), bars[1](at), bars[2](at)});
+                                   },
+                                   Vec3d(1.0)};
         Printed voxels = printed(bestOn(pitch_mm), comb);
         if (components(voxels.plain, Touching::corners) != 3) continue;
         ++checked;
         fused_at_ends += components(voxels.dithered, Touching::corners) != 3;
         // Between the faces, away from the ends of the bars.
-        const Lattice lattice = test::latticeAround(pitch_mm, comb.extent, 0.3);
+        const Lattice lattice = test::latticeAround(pitch_mm, comb.extent_mm, 0.3);
         const test::Distance between = test::box(Vec3d(0.0), {0.28, 0.23, 2}, degrees);
         for (auto v = lattice.box.begin(); v; ++v) {
           if (between(lattice.position(*v)) > 0) voxels.dithered[*v] = voxels.plain[*v] = 0;
@@ -595,14 +580,14 @@ TEST(ShapeDither, MakesNoComponentsOrCavitiesBeyondThePlainOnes) {
       return (at - from - share * (to - from)).length() - radius;
     };
   };
-  std::vector<Shape> pieces{ball, ring, {"tip", cone, Vec3d(0.8)}};
+  std::vector<test::TestShape> pieces{ball, ring, {"tip", cone, Vec3d(0.8)}};
   for (const double radius : {0.03, 0.045, 0.06, 0.09})
     pieces.push_back({"wire", wire({-0.6, -0.5, -0.3}, {0.7, 0.4, 0.5}, radius), Vec3d(0.8)});
   pieces.push_back({"hollow",
                     [](const Vec3d& at) { return std::max(at.length() - 0.7, 0.6 - at.length()); },
                     Vec3d(0.7)});
-  for (const Vec3d& pitch_mm : lattices) {
-    for (const Shape& piece : pieces) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
+    for (const test::TestShape& piece : pieces) {
       const Printed voxels = printed(bestOn(pitch_mm), piece);
       EXPECT_EQ(components(voxels.dithered, Touching::corners),
                 components(voxels.plain, Touching::corners))
@@ -613,9 +598,10 @@ TEST(ShapeDither, MakesNoComponentsOrCavitiesBeyondThePlainOnes) {
 }
 
 TEST(ShapeDither, SphereVolumeIsUnbiased) {
-  for (const Vec3d& pitch_mm : lattices) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
     const double radius = 2.6;
-    const Shape sphere{"sphere", test::sphere({0.013, -0.02, 0.007}, radius), Vec3d(radius)};
+    const test::TestShape sphere{"sphere", test::sphere({0.013, -0.02, 0.007}, radius),
+                                 Vec3d(radius)};
     const Printed voxels = printed(bestOn(pitch_mm), sphere);
     double count = 0;
     for (auto v = voxels.dithered.box().begin(); v; ++v) count += voxels.dithered[*v];
@@ -627,7 +613,7 @@ TEST(ShapeDither, SphereVolumeIsUnbiased) {
 TEST(HalfVoxelDiameter, IsTheDistanceToTheBoundaryAlongTheNormal) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
-  for (const Vec3d& pitch_mm : lattices) {
+  for (const Vec3d& pitch_mm : test::testPitches()) {
     for (int n = 0; n < 1000; ++n) {
       const openvdb::Vec3s along(Vec3d(normal(random), normal(random), normal(random)).unit());
       const Vec3d exit_voxels = Vec3d(along) * halfVoxelDiameter(along, pitch_mm) / pitch_mm;

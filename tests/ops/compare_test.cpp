@@ -8,9 +8,8 @@
 #include "io/vdb.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/scratch_folder.h"
-#include "tests/support/told.h"
+#include "tests/support/sinks.h"
 #include "vdbdither/errors.h"
-#include "vdbdither/registry.h"
 
 namespace vdbdither {
 namespace {
@@ -48,22 +47,13 @@ class Compare : public testing::Test {
   std::string told(const Grids& grids, const CoordBBox& box,
                    std::vector<std::string> arguments = {}, int height = 8) {
     arguments.push_back(other_);
-    const auto made = findOperator("compare").make();
-    Options options;
-    made->declare(options);
-    options.parse(arguments);
-    test::Listener listener;
-    made->setReporter(&listener);
-    auto& sink = static_cast<Sink&>(*made);
-    const Schema schema = schemaOf(grids, box);
-    sink.plan(schema);
-    for (const Slab& slab : test::cutIntoSlabs(grids, schema.lattice, height)) sink.write(slab);
+    const test::SinkCalled compare("compare", arguments);
     try {
-      sink.finish();
+      compare.run(schemaOf(grids, box), grids, height);
     } catch (const DataError& error) {
-      return listener.printed + error.what();
+      return compare.said.printed + error.what();
     }
-    return listener.printed;
+    return compare.said.printed;
   }
 
   test::ScratchFolder scratch_;

@@ -16,13 +16,10 @@ using testing::ThrowsMessage;
 
 const Lattice lattice = test::latticeAround({0.042, 0.084, 0.022}, Vec3d(0.9), 0.2);
 
-Schema ballWithBand(double band_mm) {
-  return test::schemaOf(
-      lattice, {{"surface", test::sampled(test::sphere({0, 0, 0}, 0.8), lattice, band_mm)}});
-}
+Schema ballWithBand(double band_mm) { return test::ballWithBand(lattice, 0.8, band_mm); }
 
 auto planning(const Schema& schema, const std::vector<std::string>& arguments) {
-  return [schema, arguments] { test::filterCalled("hollow", arguments)->plan(schema); };
+  return test::planning("hollow", schema, arguments);
 }
 
 TEST(Hollow, SaysWhichBandItNeeds) {

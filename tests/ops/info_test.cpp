@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <openvdb/points/PointDataGrid.h>
 
 #include "io/material_table.h"
+#include "io/vdb.h"
 #include "tests/support/drawn_grids.h"
-#include "tests/support/told.h"
-#include "vdbdither/registry.h"
+#include "tests/support/scratch_folder.h"
+#include "tests/support/sinks.h"
 
 namespace vdbdither {
 namespace {
@@ -18,17 +20,9 @@ using openvdb::CoordBBox;
 
 std::string told(const Schema& schema, const Grids& grids,
                  const std::vector<std::string>& arguments, int height = 8) {
-  const auto made = findOperator("info").make();
-  Options options;
-  made->declare(options);
-  options.parse(arguments);
-  test::Listener listener;
-  made->setReporter(&listener);
-  auto& sink = static_cast<Sink&>(*made);
-  sink.plan(schema);
-  for (const Slab& slab : test::cutIntoSlabs(grids, schema.lattice, height)) sink.write(slab);
-  sink.finish();
-  return listener.printed;
+  const test::SinkCalled info("info", arguments);
+  info.run(schema, grids, height);
+  return info.said.printed;
 }
 
 Schema schemaOf(const Grids& grids, const CoordBBox& box) {
@@ -79,6 +73,21 @@ TEST(Info, AnEmptyGridHasNoRange) {
   EXPECT_EQ(found["grids"][0]["type"], "vec3s");
   EXPECT_EQ(found["grids"][0]["active_voxels"], 0);
   EXPECT_FALSE(found["grids"][0].contains("least"));
+}
+
+TEST(Info, SaysThatNothingTakesPoints) {
+  initializeVdb();
+  const test::ScratchFolder scratch;
+  const std::string path = scratch / "points.vdb";
+  const auto points = openvdb::points::PointDataGrid::create();
+  points->setName("points");
+  writeVdb(path, {{{"points", points}}, {}}, VdbCodec::mask, path);
+  const test::SinkCalled info("info", {path});
+  info.run();
+  EXPECT_THAT(info.said.printed, testing::StartsWith("points    ptdataidx32: 0 voxels, "));
+  EXPECT_THAT(info.said.printed,
+              testing::EndsWith("no operator takes Tree_ptdataidx32_5_4_3; make a level set of it "
+                                "first\n"));
 }
 
 }  // namespace

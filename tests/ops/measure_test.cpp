@@ -12,8 +12,8 @@
 #include "tests/support/mesh_files.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"
+#include "tests/support/sinks.h"
 #include "vdbdither/errors.h"
-#include "vdbdither/registry.h"
 
 namespace vdbdither {
 namespace {
@@ -25,38 +25,9 @@ using openvdb::Vec3d;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// Keeps what an operator says.
-class Kept : public Reporter {
- public:
-  void warn(const std::string& text) override { warnings.push_back(text); }
-  void count(const std::string& name, double value) override { counts[name] = value; }
-  void progress(double) override {}
-  void print(const std::string& text) override { printed += text; }
-
-  std::vector<std::string> warnings;
-  std::map<std::string, double> counts;
-  std::string printed;
-};
-
-struct Measuring {
+struct Measuring : test::SinkCalled {
   explicit Measuring(const std::vector<std::string>& arguments)
-      : made(findOperator("measure").make()) {
-    Options options;
-    made->declare(options);
-    options.parse(arguments);
-    made->setReporter(&kept);
-  }
-  Sink& sink() const { return static_cast<Sink&>(*made); }
-  void run(const Schema& schema, int height = 8) const {
-    sink().plan(schema);
-    if (!sink().standsAlone()) {
-      for (const Slab& slab : test::cutIntoSlabs(schema.grids, schema.lattice, height))
-        sink().write(slab);
-    }
-    sink().finish();
-  }
-  Kept kept;
-  std::unique_ptr<Operator> made;
+      : SinkCalled("measure", arguments) {}
 };
 
 nlohmann::json jsonOf(const std::filesystem::path& path) {
@@ -82,7 +53,7 @@ TEST_F(Measure, AMeshOfItsOwnIsMeasuredWithoutAChain) {
   save(test::boxMesh(Vec3d(-0.01), Vec3d(2.01, 2.01, 1.01)), "result.stl");
   const Measuring measuring({file("result.stl"), "--reference", file("part.stl"), "--margin", "0.1",
                              "--report", file("report.json"), "--map", file("map.ply")});
-  EXPECT_TRUE(measuring.sink().standsAlone());
+  EXPECT_TRUE(measuring->standsAlone());
   measuring.run({});
   const nlohmann::json report = jsonOf(scratch / "report.json");
   EXPECT_NEAR(report["area"]["p50_mm"], 0.01, 1e-6);
@@ -94,8 +65,8 @@ TEST_F(Measure, AMeshOfItsOwnIsMeasuredWithoutAChain) {
   EXPECT_EQ(report["facets"].size(), 6U);
   EXPECT_FALSE(report.contains("components")) << "of a mesh nothing is known about voxels";
   EXPECT_FALSE(report["axes"]["z"].contains("staircase_mm"));
-  EXPECT_EQ(measuring.kept.printed, "") << "the report says it";
-  EXPECT_NEAR(measuring.kept.counts.at("p50_mm"), 0.01, 1e-6);
+  EXPECT_EQ(measuring.said.printed, "") << "the report says it";
+  EXPECT_NEAR(measuring.said.counts.at("p50_mm"), 0.01, 1e-6);
   const Mesh map = readMesh(scratch / "map.ply", {});
   EXPECT_EQ(map.triangles.size(), 12U);
 }
@@ -145,11 +116,11 @@ TEST_F(Measure, SaysItInWordsOrAsJson) {
   save(test::boxMesh(Vec3d(-0.01), Vec3d(2.01, 2.01, 1.01)), "result.stl");
   const Measuring words({file("result.stl"), "--reference", file("part.stl")});
   words.run({});
-  EXPECT_THAT(words.kept.printed, HasSubstr("by area"));
-  EXPECT_THAT(words.kept.printed, HasSubstr("10.000"));
+  EXPECT_THAT(words.said.printed, HasSubstr("by area"));
+  EXPECT_THAT(words.said.printed, HasSubstr("10.000"));
   const Measuring json({file("result.stl"), "--reference", file("part.stl"), "--json"});
   json.run({});
-  EXPECT_NEAR(nlohmann::json::parse(json.kept.printed)["area"]["p50_mm"], 0.01, 1e-6);
+  EXPECT_NEAR(nlohmann::json::parse(json.said.printed)["area"]["p50_mm"], 0.01, 1e-6);
 }
 
 TEST_F(Measure, TheMapStatesItsRangeAndColoursByTheSign) {
@@ -174,14 +145,14 @@ TEST_F(Measure, SmoothingComesBeforeMeasuring) {
   more.insert(more.end(), {"--smooth", "taubin", "--iterations", "20"});
   const Measuring smooth(more);
   smooth.run({});
-  EXPECT_EQ(nlohmann::json::parse(smooth.kept.printed)["surface"]["smoothing"], 20);
-  EXPECT_NE(nlohmann::json::parse(smooth.kept.printed)["surface"]["volume_mm3"],
-            nlohmann::json::parse(plain.kept.printed)["surface"]["volume_mm3"]);
+  EXPECT_EQ(nlohmann::json::parse(smooth.said.printed)["surface"]["smoothing"], 20);
+  EXPECT_NE(nlohmann::json::parse(smooth.said.printed)["surface"]["volume_mm3"],
+            nlohmann::json::parse(plain.said.printed)["surface"]["volume_mm3"]);
 }
 
 TEST_F(Measure, RefusesWhatCannotBeMeasured) {
   const auto plan = [&](const std::vector<std::string>& arguments, const Schema& in = {}) {
-    return [=] { Measuring(arguments).sink().plan(in); };
+    return [=] { Measuring(arguments)->plan(in); };
   };
   EXPECT_THAT(plan({file("part.stl")}),
               ThrowsMessage<UsageError>(

@@ -11,8 +11,8 @@
 #include "tests/support/filters.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/sinks.h"
 #include "vdbdither/errors.h"
-#include "vdbdither/registry.h"
 
 namespace vdbdither {
 namespace {
@@ -25,22 +25,9 @@ using openvdb::Vec3d;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// A sink of that name ready to plan.
-struct Export {
+struct Export : test::SinkCalled {
   explicit Export(const std::vector<std::string>& arguments)
-      : made(findOperator("mesh-export").make()) {
-    Options options;
-    made->declare(options);
-    options.parse(arguments);
-  }
-  Sink& sink() const { return static_cast<Sink&>(*made); }
-  void run(const Schema& schema, int height = 8) const {
-    sink().plan(schema);
-    for (const Slab& slab : test::cutIntoSlabs(schema.grids, schema.lattice, height))
-      sink().write(slab);
-    sink().finish();
-  }
-  std::unique_ptr<Operator> made;
+      : SinkCalled("mesh-export", arguments) {}
 };
 
 /// A ball of 0.6 mm, as distances and as voxels.
@@ -136,7 +123,7 @@ TEST(MeshExport, RefusesWhatHasNoSurface) {
   const auto plan = [&](const std::vector<std::string>& more, const Schema& in) {
     std::vector<std::string> arguments{path};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    return [=] { Export(arguments).sink().plan(in); };
+    return [=] { Export(arguments)->plan(in); };
   };
   const Schema in = ball();
   EXPECT_THAT(plan({"--grid", "displaced"}, in),
@@ -152,7 +139,7 @@ TEST(MeshExport, RefusesWhatHasNoSurface) {
   normals->setName("N");
   EXPECT_THAT(plan({"--grid", "N"}, test::schemaOf(in.lattice, {{"N", normals}})),
               ThrowsMessage<DataError>(HasSubstr("grid 'N' is of vec3s, which has no surface")));
-  EXPECT_THAT([&] { Export({scratch / "a.vdb"}).sink().plan(in); },
+  EXPECT_THAT([&] { Export({scratch / "a.vdb"})->plan(in); },
               ThrowsMessage<UsageError>(HasSubstr("is no mesh file that is written")));
   const auto nothing = BoolGrid::create(false);
   nothing->setName("solid");

@@ -20,13 +20,10 @@ using testing::ThrowsMessage;
 
 const Lattice lattice = test::latticeAround({0.042, 0.084, 0.022}, Vec3d(0.6), 0.3);
 
-Schema ballWithBand(double band_mm) {
-  return test::schemaOf(
-      lattice, {{"surface", test::sampled(test::sphere({0, 0, 0}, 0.5), lattice, band_mm)}});
-}
+Schema ballWithBand(double band_mm) { return test::ballWithBand(lattice, 0.5, band_mm); }
 
 auto planning(const Schema& schema, const std::vector<std::string>& arguments) {
-  return [schema, arguments] { test::filterCalled("offset", arguments)->plan(schema); };
+  return test::planning("offset", schema, arguments);
 }
 
 class OffsetMap : public testing::Test {

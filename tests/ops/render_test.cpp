@@ -11,8 +11,8 @@
 #include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"
+#include "tests/support/sinks.h"
 #include "vdbdither/errors.h"
-#include "vdbdither/registry.h"
 
 namespace vdbdither {
 namespace {
@@ -24,33 +24,8 @@ using openvdb::Vec3d;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// Hears nothing.
-class Silent : public Reporter {
- public:
-  void warn(const std::string&) override {}
-  void count(const std::string&, double) override {}
-  void progress(double) override {}
-};
-
-struct Rendering {
-  explicit Rendering(const std::vector<std::string>& arguments)
-      : made(findOperator("render").make()) {
-    Options options;
-    made->declare(options);
-    options.parse(arguments);
-    made->setReporter(&silent);
-  }
-  Sink& sink() const { return static_cast<Sink&>(*made); }
-  void run(const Schema& schema = {}, int height = 8) const {
-    sink().plan(schema);
-    if (!sink().standsAlone()) {
-      for (const Slab& slab : test::cutIntoSlabs(schema.grids, schema.lattice, height))
-        sink().write(slab);
-    }
-    sink().finish();
-  }
-  Silent silent;
-  std::unique_ptr<Operator> made;
+struct Rendering : test::SinkCalled {
+  explicit Rendering(const std::vector<std::string>& arguments) : SinkCalled("render", arguments) {}
 };
 
 /// A scratch folder with a part: a box of 2 × 1 × 1 mm.
@@ -77,7 +52,7 @@ std::vector<std::string> with(std::vector<std::string> words,
 
 TEST_F(Render, AMeshOfItsOwnIsDrawnWithoutAChain) {
   const Rendering rendering(with({file("part.stl"), file("part.png")}, from_above));
-  EXPECT_TRUE(rendering.sink().standsAlone());
+  EXPECT_TRUE(rendering->standsAlone());
   rendering.run();
   const Picture picture = readPicture(scratch / "part.png");
   EXPECT_EQ(picture.width, 20U + 16U);
@@ -152,7 +127,7 @@ TEST_F(Render, AnExrHoldsTheLightTimesTheCover) {
 
 TEST_F(Render, RefusesWhatCannotBeDrawn) {
   const auto plan = [&](const std::vector<std::string>& arguments, const Schema& in = {}) {
-    return [=] { Rendering(arguments).sink().plan(in); };
+    return [=] { Rendering(arguments)->plan(in); };
   };
   const std::string words = "name the picture to write, and before it at most one mesh to draw";
   EXPECT_THAT(plan({"a.stl", "b.stl", "c.png"}), ThrowsMessage<UsageError>(words));

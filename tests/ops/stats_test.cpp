@@ -7,10 +7,9 @@
 
 #include "io/material_table.h"
 #include "tests/support/drawn_grids.h"
-#include "tests/support/told.h"
+#include "tests/support/sinks.h"
 #include "tests/support/volumes.h"
 #include "vdbdither/errors.h"
-#include "vdbdither/registry.h"
 
 namespace vdbdither {
 namespace {
@@ -40,18 +39,9 @@ Job jobOf(Grids grids, const CoordBBox& box) {
 }
 
 std::string told(const Job& job, const std::vector<std::string>& arguments, int height = 8) {
-  const auto made = findOperator("stats").make();
-  Options options;
-  made->declare(options);
-  options.parse(arguments);
-  test::Listener listener;
-  made->setReporter(&listener);
-  auto& sink = static_cast<Sink&>(*made);
-  sink.plan(job.schema);
-  for (const Slab& slab : test::cutIntoSlabs(job.grids, job.schema.lattice, height))
-    sink.write(slab);
-  sink.finish();
-  return listener.printed;
+  const test::SinkCalled stats("stats", arguments);
+  stats.run(job.schema, job.grids, height);
+  return stats.said.printed;
 }
 
 TEST(Stats, CountsVoxelsVolumesAndFacesOfEachMaterial) {

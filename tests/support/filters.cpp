@@ -31,6 +31,10 @@ Schema schemaOf(const Lattice& lattice, Grids grids) {
   return schema;
 }
 
+Schema ballWithBand(const Lattice& lattice, double radius_mm, double band_mm) {
+  return schemaOf(lattice, {{"surface", sampled(sphere({0, 0, 0}, radius_mm), lattice, band_mm)}});
+}
+
 Grids runWhole(Filter& filter, const Schema& schema) {
   filter.plan(schema);
   Slab slab{schema.lattice.layers(), schema.lattice.layers(), {}};

@@ -17,6 +17,15 @@ std::unique_ptr<Filter> filterCalled(const std::string& name,
 /// A schema of these grids on a lattice.
 Schema schemaOf(const Lattice& lattice, Grids grids);
 
+/// `surface` of a ball around the origin, held as far as `band_mm`.
+Schema ballWithBand(const Lattice& lattice, double radius_mm, double band_mm);
+
+/// Plans the filter of that name.
+inline auto planning(const std::string& name, const Schema& schema,
+                     const std::vector<std::string>& arguments) {
+  return [=] { filterCalled(name, arguments)->plan(schema); };
+}
+
 /// What `filter`, planned on these grids, makes of the whole lattice in one slab.
 Grids runWhole(Filter& filter, const Schema& schema);
 

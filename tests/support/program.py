@@ -62,7 +62,7 @@ class ProgramTest(unittest.TestCase):
         self.assertEqual(done.returncode, code, (arguments, said))
         self.assertIn(message, said)
         self.assertEqual(said.count("\n"), 1, said)
-        self.assertTrue(said.startswith("vdbdither "), said)
+        self.assertRegex(said, r"^vdbdither( [a-z0-9-]+)?: ")
         self.assertFalse(said.endswith(".\n"), said)
         self.assertEqual(self.listing(), before)
         return done

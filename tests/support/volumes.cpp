@@ -43,6 +43,22 @@ Distance torus(const Vec3d& centre, double ring_radius, double tube_radius) {
   };
 }
 
+const std::vector<openvdb::Vec3d>& testPitches() {
+  static const std::vector<openvdb::Vec3d> pitches{
+      {0.042, 0.084, 0.022}, {0.04233, 0.08467, 0.027}, {0.05, 0.05, 0.05}};
+  return pitches;
+}
+
+const std::vector<TestShape>& testShapes() {
+  static const std::vector<TestShape> shapes{
+      {"sphere", sphere({0.013, -0.02, 0.007}, 0.4), openvdb::Vec3d(0.43)},
+      {"tilted box", box(openvdb::Vec3d(0.0), {0.35, 0.3, 0.2}, {12, 25, 31}), openvdb::Vec3d(0.5)},
+      {"torus", torus({0.01, 0.01, 0}, 0.35, 0.15), {0.52, 0.52, 0.16}},
+      {"thin plate", box({0.001, 0.002, 0.003}, {0.4, 0.4, 0.03}, {5, -4, 0}), {0.45, 0.45, 0.12}},
+  };
+  return shapes;
+}
+
 Lattice latticeAround(const Vec3d& pitch_mm, const Vec3d& extent_mm, double padding_mm) {
   Coord reach;
   for (int axis = 0; axis < 3; ++axis) {

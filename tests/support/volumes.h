@@ -21,6 +21,17 @@ Distance box(const openvdb::Vec3d& centre, const openvdb::Vec3d& half,
 /// A torus around an axis parallel to z.
 Distance torus(const openvdb::Vec3d& centre, double ring_radius, double tube_radius);
 
+/// Of a Mimaki 3DUJ-553, a Stratasys J750, and cubes.
+const std::vector<openvdb::Vec3d>& testPitches();
+
+/// A sphere, a tilted box, a torus and a thin plate.
+struct TestShape {
+  const char* name;
+  Distance distance;
+  openvdb::Vec3d extent_mm;  ///< half of what it takes up, about the origin
+};
+const std::vector<TestShape>& testShapes();
+
 /// The lattice over the box from -extent_mm to extent_mm, plus `padding_mm`.
 Lattice latticeAround(const openvdb::Vec3d& pitch_mm, const openvdb::Vec3d& extent_mm,
                       double padding_mm);

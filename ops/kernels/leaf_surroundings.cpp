@@ -1,0 +1,112 @@
+#include "ops/kernels/leaf_surroundings.h"
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
+#include <cmath>
+#include <limits>
+
+namespace vdbdither {
+
+using openvdb::Coord;
+
+namespace {
+
+using Lanes = std::array<std::uint32_t, 4>;
+
+/// All ones where a bit is set.
+constexpr std::array<Lanes, 16> lanes_by_bits = [] {
+  std::array<Lanes, 16> lanes{};
+  for (unsigned bits = 0; bits < lanes.size(); ++bits) {
+    for (unsigned lane = 0; lane < 4; ++lane) lanes[bits][lane] = (bits >> lane & 1U) ? ~0U : 0U;
+  }
+  return lanes;
+}();
+
+inline float oneOf(float value, bool held) {
+  return held ? value : std::copysign(std::numeric_limits<float>::infinity(), value);
+}
+
+/// Four values, those without a bit as the infinity of their sign.
+inline void copyFour(float* out, const float* in, unsigned bits) {
+#ifdef __SSE2__
+  const __m128 held = _mm_loadu_ps(reinterpret_cast<const float*>(lanes_by_bits[bits].data()));
+  const __m128 kept = _mm_and_ps(_mm_loadu_ps(in), _mm_or_ps(held, _mm_set1_ps(-0.0F)));
+  const __m128 none = _mm_set1_ps(std::numeric_limits<float>::infinity());
+  _mm_storeu_ps(out, _mm_or_ps(kept, _mm_andnot_ps(held, none)));
+#else
+  for (unsigned lane = 0; lane < 4; ++lane) out[lane] = oneOf(in[lane], (bits >> lane & 1U) != 0);
+#endif
+}
+
+}  // namespace
+
+/// What a leaf's place in the tree holds: the values and states of its voxels in its own order.
+struct LeafSurroundings::Block {
+  const float* values;
+  const openvdb::util::NodeMask<3>* active;
+
+  /// Half a row: `z` is 0 or 4.
+  void copyHalf(float* out, int x, int y, int z) const {
+    const std::uint64_t word = active->getWord<std::uint64_t>(static_cast<openvdb::Index>(x));
+    copyFour(out, values + 64 * x + 8 * y + z, static_cast<unsigned>(word >> (8 * y + z)) & 0xfU);
+  }
+};
+
+LeafSurroundings::Block LeafSurroundings::blockAt(const Coord& origin) {
+  static const openvdb::util::NodeMask<3> all(true);
+  static const openvdb::util::NodeMask<3> none(false);
+  static constexpr auto filled = [](float value) {
+    std::array<float, 512> values{};
+    values.fill(value);
+    return values;
+  };
+  static constexpr std::array<float, 512> outside = filled(1);
+  static constexpr std::array<float, 512> inside = filled(-1);
+  if (rowWithin(origin.z(), valid_) == 0) return {outside.data(), &none};
+  if (const FloatLeaf* leaf = surface_.probeConstLeaf(origin))
+    return {leaf->buffer().data(), &leaf->getValueMask()};
+  float value = 0;
+  if (!surface_.probeValue(origin, value)) return {(value < 0 ? inside : outside).data(), &none};
+  std::array<float, 512>& tile = tiles_.emplace_back();
+  tile.fill(value);
+  return {tile.data(), &all};
+}
+
+void LeafSurroundings::visit(const FloatLeaf& leaf) {
+  const Coord origin = leaf.origin();
+  tiles_.clear();
+  for (const int step_x : {-1, 0, 1}) {
+    for (const int step_y : {-1, 0, 1}) {
+      const Block below = blockAt(origin.offsetBy(8 * step_x, 8 * step_y, -8));
+      const Block middle = blockAt(origin.offsetBy(8 * step_x, 8 * step_y, 0));
+      const Block above = blockAt(origin.offsetBy(8 * step_x, 8 * step_y, 8));
+
+      // Of the neighbours, the last two rows, all, or the first two; along z half of them.
+      const auto begin = [](int step) { return step < 0 ? 8 - halo : 0; };
+      const auto end = [](int step) { return step > 0 ? halo : 8; };
+      for (int x = begin(step_x); x < end(step_x); ++x) {
+        for (int y = begin(step_y); y < end(step_y); ++y) {
+          float* row =
+              &values_[static_cast<std::size_t>(indexOf(8 * step_x + x, 8 * step_y + y, 0))];
+          below.copyHalf(row - 4, x, y, 4);
+          middle.copyHalf(row, x, y, 0);
+          middle.copyHalf(row + 4, x, y, 4);
+          above.copyHalf(row + 8, x, y, 0);
+        }
+      }
+    }
+  }
+  // Where the valid layers begin or end within the leaves.
+  for (int z = -halo; z < 8 + halo; ++z) {
+    if (valid_.contains(origin.z() + z)) continue;
+    for (int x = -halo; x < 8 + halo; ++x) {
+      for (int y = -halo; y < 8 + halo; ++y)
+        values_[static_cast<std::size_t>(indexOf(x, y, z))] =
+            std::numeric_limits<float>::infinity();
+    }
+  }
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,40 @@
+"""What the scripts of the paper's figures share: the methods, and how a chain is run."""
+
+import os
+import pathlib
+import subprocess
+
+PRINTER = "mimaki-3duj-553"
+
+PAPER = "dither --preset paper"
+BLUE = f"{PAPER} --size 64 --sigma"
+
+# What stands between mesh2sdf and the print, and the options of mesh2sdf.
+METHODS = {
+    "control": ([], "dither --mask none"),
+    "interlacing": (["--refine-y", "2"], "interlace"),
+    "white noise": ([], f"{PAPER} --mask white"),
+    "blue noise 2.5": ([], f"{BLUE} 2.5"),
+    "blue noise 1.1": ([], f"{BLUE} 1.1"),
+    "the default": ([], "dither"),
+}
+
+HERE = pathlib.Path(__file__).resolve().parent
+RESULT = HERE.parents[1] / "docs/paper"
+
+
+def file_name(words):
+    return words.replace(" ", "-").replace(",", "")
+
+
+def program(folder, *words):
+    """The first `vdbdither` on the PATH, quietly, in `folder`; what it prints."""
+    return subprocess.run(["vdbdither", *map(str, words)], cwd=folder, check=True, stdout=subprocess.PIPE,
+                          env={**os.environ, "LC_ALL": "C.UTF-8"}).stdout
+
+
+def chain(folder, mesh, method, *rest, pitch=None):
+    """mesh2sdf ! the method ! `rest`, a chain in words."""
+    refine, step = method
+    lattice = ["--pitch", pitch] if pitch else ["--printer", PRINTER]
+    return program(folder, "mesh2sdf", mesh, *lattice, *refine, "!", *step.split(), *" ".join(rest).split(), "--quiet")

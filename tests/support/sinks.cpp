@@ -1,0 +1,25 @@
+#include "tests/support/sinks.h"
+
+#include "tests/support/drawn_grids.h"
+#include "vdbdither/registry.h"
+
+namespace vdbdither::test {
+
+SinkCalled::SinkCalled(const std::string& name, const std::vector<std::string>& arguments)
+    : made_(findOperator(name).make()) {
+  Options options;
+  made_->declare(options);
+  options.parse(arguments);
+  made_->setReporter(&said);
+}
+
+void SinkCalled::run(const Schema& schema, const Grids& grids, int height) const {
+  Sink& sink = **this;
+  sink.plan(schema);
+  if (!sink.standsAlone()) {
+    for (const Slab& slab : cutIntoSlabs(grids, schema.lattice, height)) sink.write(slab);
+  }
+  sink.finish();
+}
+
+}  // namespace vdbdither::test
