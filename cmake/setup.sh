@@ -9,6 +9,7 @@ program_packages=(build-essential cmake ninja-build libopenvdb-dev libboost-iost
 # To build and run the tests.
 test_packages=(libgtest-dev libgmock-dev libbenchmark-dev libspng-dev libopenvdb-tools
   python3-openvdb python3-numpy python3-pil python3-skimage python3-matplotlib)
+sanitize_packages=(clang-14 libclang-rt-14-dev llvm-14)
 lint_packages=(clang-14 clang-format-14 clang-tidy-14)
 
 # Says what takes long to whom is watching.

@@ -8,7 +8,9 @@
 #include <unistd.h>
 
 #include "io/archive_digest.h"
+#include "io/pipe_input.h"
 #include "vdbdither/errors.h"
+#include "vdbdither/interrupt.h"
 #include "vdbdither/openvdb.h"
 
 namespace vdbdither {
@@ -38,6 +40,7 @@ void FrameWriter::send(const VdbContents& contents) {
   // The reader is at hand and the pipe is quick: packing the voxels would cost more than it saves.
   const std::string bytes = archiveBytes(contents, VdbCodec::mask);
   for (std::size_t sent = 0; sent < bytes.size();) {
+    throwIfInterrupted();
     const ssize_t count = ::write(descriptor_, bytes.data() + sent, bytes.size() - sent);
     if (count >= 0) {
       sent += static_cast<std::size_t>(count);
@@ -67,10 +70,9 @@ std::string FrameReader::take(std::size_t size) {
   while (bytes.size() < size) {
     const std::size_t begin = bytes.size();
     bytes.resize(begin + std::min(chunk, size - begin));
-    const ssize_t count = ::read(descriptor_, bytes.data() + begin, bytes.size() - begin);
-    if (count < 0 && errno != EINTR)
-      throw DataError("cannot read " + where_ + ": " + std::strerror(errno));
-    bytes.resize(begin + std::max<ssize_t>(count, 0));
+    const std::size_t count =
+        readSome(descriptor_, bytes.data() + begin, bytes.size() - begin, where_);
+    bytes.resize(begin + count);
     if (count == 0) break;
   }
   return bytes;

@@ -15,6 +15,8 @@ Picture readPicture(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error))
     throw DataError("no such file '" + path.string() + "'");
+  if (!std::filesystem::is_regular_file(path, error))
+    throw DataError("'" + path.string() + "' is not a file");
   std::ifstream stream(path, std::ios::binary);
   const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), {});
   if (!stream) throw DataError("cannot read '" + path.string() + "'");

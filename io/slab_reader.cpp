@@ -1,14 +1,12 @@
 #include "io/slab_reader.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fcntl.h>
 #include <filesystem>
 #include <limits>
 #include <sstream>
 #include <unistd.h>
 
+#include "io/pipe_input.h"
 #include "io/vdb.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/layers.h"
@@ -59,8 +57,7 @@ SlabReader::SlabReader(std::string path, const std::vector<std::string>& names)
     openPipe(STDIN_FILENO);
   } else if (type == std::filesystem::file_type::fifo) {
     shown_ = "'" + path_ + "'";
-    descriptor_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor_ < 0) throw DataError("cannot read " + shown_ + ": " + std::strerror(errno));
+    descriptor_ = openNamedPipe(path_, shown_);
     openPipe(descriptor_);
   } else {
     shown_ = "'" + path_ + "'";
@@ -119,6 +116,12 @@ Grids SlabReader::run(ZRange core) {
   return result;
 }
 
+void SlabReader::drain() {
+  const std::lock_guard lock(mutex_);
+  slabs_.clear();
+  while (isPipe() && !ended_) ended_ = !frames_->next();
+}
+
 /// Frames come in rising z and so do the cores asked of a pipe: what lies below is dropped, what is
 /// missing is fetched.
 void SlabReader::takeFrames(ZRange core) {
@@ -128,8 +131,6 @@ void SlabReader::takeFrames(ZRange core) {
     ended_ = !slab;
     if (slab && slab->core.end > core.begin) slabs_.push_back(std::move(*slab));
   }
-  // The closing frame must be seen before anything downstream is published.
-  if (core.end >= frames_->schema().lattice.layers().end && !ended_) ended_ = !frames_->next();
 }
 
 /// What was made with --layers lacks the others, which are not empty.

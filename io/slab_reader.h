@@ -29,6 +29,10 @@ class SlabReader {
   /// are layers missing of it. Safe to call from many threads.
   [[nodiscard]] Grids run(ZRange core);
 
+  /// Reads a pipe to its closing frame and lets go of what is held, once `run` is not to be called
+  /// any more. Throws DataError where the frame does not come.
+  void drain();
+
  private:
   void openPipe(int descriptor);
   void openFile(const std::vector<std::string>& names);

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "vdbdither/errors.h"
+#include "vdbdither/interrupt.h"
 
 namespace vdbdither {
 
@@ -27,7 +28,10 @@ int dataOutput() { return data_descriptor; }
 void printData(const char* text) {
   for (std::size_t left = std::strlen(text); left > 0;) {
     const ssize_t count = ::write(data_descriptor, text, left);
-    if (count < 0 && errno == EINTR) continue;
+    if (count < 0 && errno == EINTR) {
+      throwIfInterrupted();
+      continue;
+    }
     if (count < 0)
       throw DataError(std::string("cannot write to standard output: ") + std::strerror(errno));
     text += count;

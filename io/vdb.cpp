@@ -15,6 +15,7 @@
 #include <openvdb/tools/ChangeBackground.h>
 
 #include "io/archive_digest.h"
+#include "io/pipe_input.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/options.h"
@@ -325,11 +326,9 @@ VdbContents readVdbPipe(int descriptor, const std::string& where) {
   std::string bytes;
   std::vector<char> buffer(1 << 20);
   for (;;) {
-    const ssize_t size = ::read(descriptor, buffer.data(), buffer.size());
-    if (size < 0 && errno == EINTR) continue;
-    if (size < 0) throw DataError("cannot read " + where + ": " + std::strerror(errno));
+    const std::size_t size = readSome(descriptor, buffer.data(), buffer.size(), where);
     if (size == 0) break;
-    bytes.append(buffer.data(), static_cast<std::size_t>(size));
+    bytes.append(buffer.data(), size);
   }
   return contentsOfBytes(bytes, where);
 }

@@ -70,11 +70,15 @@ class Compare : public Sink {
     end_ = in.core.end;
   }
 
-  void finish() override {
+  void drain() override {
     if (end_ == schema_.lattice.layers().end) {
       const ZRange others = other_->schema().lattice.layers();
       compare({}, {std::max(end_, others.begin), others.end});
     }
+    other_->drain();
+  }
+
+  void finish() override {
     std::string summary;
     for (const auto& [name, finding] : findings_) {
       if (!finding.equal()) summary += (summary.empty() ? "" : "; ") + finding.text(name);

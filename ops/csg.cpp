@@ -76,6 +76,8 @@ class CsgOperator : public Filter {
 
   [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
 
+  void drain() override { other_->drain(); }
+
   [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 14}; }
 
   [[nodiscard]] Grids run(const Slab& in) const override {

@@ -40,6 +40,7 @@ class ReadOperator : public Source {
   }
 
   [[nodiscard]] Grids run(ZRange core) const override { return reader_->run(core); }
+  void drain() override { reader_->drain(); }
 
  private:
   std::string path_;

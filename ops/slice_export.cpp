@@ -150,6 +150,11 @@ class SliceExport : public Sink {
                   {reinterpret_cast<const std::uint8_t*>(manifest.data()), manifest.size()});
     stack_->commit();
     stack_.reset();
+    // Some layers of a job may well be empty.
+    const bool all = ZRange{first_layer_, last_layer_ + 1} == schema_.lattice.layers();
+    if (all &&
+        std::all_of(voxels_.begin() + 1, voxels_.end(), [](auto count) { return count == 0; }))
+      report().warn("no voxel is printed; is the part thinner than a voxel, or its unit another?");
     report().count("slices", static_cast<double>(last_layer_ - first_layer_ + 1));
     for (std::size_t i = 0; i < materials_.size(); ++i) {
       report().count("voxels of " + materials_[i].name, static_cast<double>(voxels_[i + 1]));
@@ -223,18 +228,20 @@ class SliceExport : public Sink {
         source_ == "material"
             ? sliceRuns(*findGrid<openvdb::Int32Grid>(in.grids, source_), frame_, layers)
             : sliceRuns(*findGrid<openvdb::BoolGrid>(in.grids, source_), frame_, layers);
-    int next = layers.begin;
-    using Layer = std::shared_ptr<LayerOutput>;
+    // They are kept here, for TBB forgets what is on its way when one of the steps fails.
+    std::vector<LayerOutput> outputs(static_cast<std::size_t>(layers.size()));
+    std::size_t next = 0;
+    using Layer = LayerOutput*;
     const auto take = [&](tbb::flow_control& control) -> Layer {
-      if (next == layers.end) {
+      if (next == outputs.size()) {
         control.stop();
         return nullptr;
       }
-      auto layer = std::make_shared<LayerOutput>();
-      layer->z = next;
-      layer->image = std::move(images[next - layers.begin]);
+      LayerOutput& layer = outputs[next];
+      layer.z = layers.begin + static_cast<int>(next);
+      layer.image = std::move(images[next]);
       ++next;
-      return layer;
+      return &layer;
     };
     const auto encode = [&](Layer layer) {
       countVoxels(*layer);
@@ -246,7 +253,10 @@ class SliceExport : public Sink {
       }
       return layer;
     };
-    const auto store = [&](const Layer& layer) { storeLayer(*layer); };
+    const auto store = [&](Layer layer) {
+      storeLayer(*layer);
+      *layer = {};
+    };
     tbb::parallel_pipeline(
         std::size_t{2} * tbb::this_task_arena::max_concurrency(),
         tbb::make_filter<void, Layer>(tbb::filter_mode::serial_in_order, take) &

@@ -24,7 +24,10 @@ Interrupted::Interrupted(int signal_number)
     : Error(std::string("stopped: ") + strsignal(signal_number)), signal_(signal_number) {}
 
 void noteInterrupts() {
-  for (const int number : {SIGINT, SIGTERM, SIGHUP}) std::signal(number, note);
+  struct sigaction noting {};
+  noting.sa_handler = note;
+  // No SA_RESTART: a write to a pipe that nobody reads is to come back.
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) ::sigaction(number, &noting, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
 }
 

@@ -73,6 +73,11 @@ class Operator {
   /// once the options are read.
   [[nodiscard]] virtual std::string inputFile() const { return ""; }
 
+  /// Reads what it is fed, besides slabs, to the end. Called once every layer that the run wants
+  /// has passed and before a sink publishes, in a thread of its own: who writes a pipe is to end
+  /// well although not all of it was wanted, and when he does not, that must be known by then.
+  virtual void drain() {}
+
   void setReporter(Reporter* reporter) { reporter_ = reporter; }
 
  protected:

@@ -5,6 +5,7 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <mutex>
 #include <set>
 #include <sstream>
@@ -232,6 +233,7 @@ class Pipeline::Stage : public Reporter {
   [[nodiscard]] std::string inputFile() const {
     return inStage(name(), [&] { return operator_->inputFile(); });
   }
+  void drain() { operator_->drain(); }
   [[nodiscard]] Source* source() const { return dynamic_cast<Source*>(operator_.get()); }
   [[nodiscard]] Filter* filter() const { return dynamic_cast<Filter*>(operator_.get()); }
   [[nodiscard]] Sink* sink() const { return dynamic_cast<Sink*>(operator_.get()); }
@@ -565,9 +567,20 @@ void Pipeline::run() {
   for (std::size_t index = 1; index < stages_.size(); ++index) {
     if (stages_[index]->filter()) pushEmpty(index, stages_[index]->layers.end);
   }
+  drain();
   for (const auto& stage : stages_) {
     if (stage->sink()) stage->timed([&] { stage->sink()->finish(); });
   }
+}
+
+void Pipeline::drain() {
+  // All at once: several pipes may have one writer, who waits where nobody reads.
+  std::vector<std::future<void>> drains;
+  drains.reserve(stages_.size());
+  for (const auto& stage : stages_)
+    drains.push_back(
+        std::async(std::launch::async, [&] { stage->timed([&] { stage->drain(); }); }));
+  for (std::future<void>& drain : drains) drain.get();
 }
 
 void Pipeline::push(std::size_t index, Slab slab) {

@@ -79,6 +79,7 @@ class Pipeline {
   void push(std::size_t index, Slab slab);
   void pushEmpty(std::size_t index, int end);
   void take(std::size_t index, Slab slab);
+  void drain();
   [[nodiscard]] double expectedMemoryBytes(int slab_layers) const;
   [[nodiscard]] double memoryBudgetBytes() const;
   void planWork();

@@ -6,7 +6,7 @@ import time
 import unittest
 
 import meshes
-from program import MIMAKI, ProgramTest
+from program import MIMAKI, PATIENCE, ProgramTest
 
 
 class Masks(ProgramTest):
@@ -106,7 +106,7 @@ class Masks(ProgramTest):
             process = self.start(*arguments, env=environment)
             time.sleep(1)
             process.send_signal(signal.SIGINT)
-            _, said = process.communicate(timeout=60)
+            _, said = process.communicate(timeout=60 * PATIENCE)
             self.assertEqual(process.returncode, 128 + signal.SIGINT, said)
             self.assertEqual(self.listing(), before)
 

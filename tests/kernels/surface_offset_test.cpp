@@ -147,7 +147,7 @@ TEST(SurfaceOffset, RefusesHeightsBeyondTheLimit) {
     SurfaceOffset offset = offsetOn(0.25);
     offset.from_grid = true;
     offset.grid_limit_mm = 0.1;
-    EXPECT_THROW(offset.run(*surface, heights.get(), lattice.layers(), lattice.layers()),
+    EXPECT_THROW((void)offset.run(*surface, heights.get(), lattice.layers(), lattice.layers()),
                  DataError);
   }
 }

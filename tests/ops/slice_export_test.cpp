@@ -15,6 +15,7 @@
 #include "tests/support/drawn_grids.h"
 #include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/told.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/operator.h"
 #include "vdbdither/registry.h"
@@ -241,6 +242,21 @@ TEST(SliceExport, NothingExistsBeforeFinishNorAfterAFailure) {
     EXPECT_FALSE(fs::exists(scratch / "out"));
   }
   EXPECT_TRUE(fs::is_empty(scratch.path()));
+}
+
+TEST(SliceExport, AStackWithoutAVoxelIsTold) {
+  const test::ScratchFolder folder;
+  Job empty = smallJob();
+  empty.grids = empty.schema.grids;
+  int number = 0;
+  for (const auto& [job, warnings] : {std::pair{smallJob(), 0}, std::pair{empty, 1}}) {
+    Export to({folder / std::to_string(number++)});
+    test::Listener listener;
+    to.made->setReporter(&listener);
+    to.run(job);
+    ASSERT_EQ(static_cast<int>(listener.warnings.size()), warnings);
+    if (warnings > 0) EXPECT_THAT(listener.warnings[0], HasSubstr("no voxel is printed"));
+  }
 }
 
 TEST(SliceExport, OverwritingReplacesAStackAndNothingElse) {

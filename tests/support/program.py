@@ -9,6 +9,9 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = pathlib.Path(os.environ.get("VDBDITHER_PROGRAM", ROOT / "build/release/vdbdither")).resolve()
 
+# How much longer everything may take under a sanitizer.
+PATIENCE = 10 if os.environ.get("VDBDITHER_SANITIZER") else 1
+
 MIMAKI = ("--printer", "mimaki-3duj-553")
 
 
@@ -33,7 +36,7 @@ class ProgramTest(unittest.TestCase):
 
     def run_program(self, *arguments, program=PROGRAM, **keywords):
         """The finished process. Standard output and error are bytes."""
-        keywords = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": 120, **keywords}
+        keywords = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": 120 * PATIENCE, **keywords}
         if "input" not in keywords:
             keywords.setdefault("stdin", subprocess.DEVNULL)
         return subprocess.run([program, *map(str, arguments)], cwd=self.folder, **keywords)
@@ -47,7 +50,7 @@ class ProgramTest(unittest.TestCase):
     def shell(self, line):
         """The same for a line of bash, in which every part of a pipe must end well."""
         done = subprocess.run(["bash", "-o", "pipefail", "-c", line], cwd=self.folder, env=self.environment(),
-                              stdin=subprocess.DEVNULL, capture_output=True, timeout=120)
+                              stdin=subprocess.DEVNULL, capture_output=True, timeout=120 * PATIENCE)
         self.assertEqual((done.returncode, done.stderr), (0, b""), line)
         return done.stdout
 

@@ -19,6 +19,7 @@ void SinkCalled::run(const Schema& schema, const Grids& grids, int height) const
   if (!sink.standsAlone()) {
     for (const Slab& slab : cutIntoSlabs(grids, schema.lattice, height)) sink.write(slab);
   }
+  sink.drain();
   sink.finish();
 }
 

@@ -1,0 +1,55 @@
+#include "io/pipe_input.h"
+
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include "vdbdither/errors.h"
+#include "vdbdither/interrupt.h"
+
+namespace vdbdither {
+
+namespace {
+
+[[noreturn]] void fail(const std::string& where) {
+  throw DataError("cannot read " + where + ": " + std::strerror(errno));
+}
+
+/// Returns once there is something to read, or the end.
+void waitForInput(int descriptor) {
+  // A signal may arrive just before the wait begins, or in another thread.
+  constexpr int look_again_milliseconds = 100;
+  pollfd wanted{descriptor, POLLIN, 0};
+  int ready = 0;
+  do {
+    throwIfInterrupted();
+    ready = ::poll(&wanted, 1, look_again_milliseconds);
+  } while (ready == 0 || (ready < 0 && errno == EINTR));
+}
+
+}  // namespace
+
+int openNamedPipe(const std::string& path, const std::string& where) {
+  // Otherwise this would wait for a writer that may never come, deaf to the user.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) fail(where);
+  const int flags = ::fcntl(descriptor, F_GETFL);
+  if (flags < 0 || ::fcntl(descriptor, F_SETFL, flags & ~O_NONBLOCK) < 0) {
+    ::close(descriptor);
+    fail(where);
+  }
+  return descriptor;
+}
+
+std::size_t readSome(int descriptor, char* bytes, std::size_t size, const std::string& where) {
+  for (;;) {
+    waitForInput(descriptor);
+    const ssize_t count = ::read(descriptor, bytes, size);
+    if (count >= 0) return static_cast<std::size_t>(count);
+    if (errno != EINTR) fail(where);
+  }
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,197 @@
+"""Mesh files that are not what they should be, through the whole chain: slices, with a warning where something had to be
+mended, or a refusal in one line; in little time and memory."""
+
+import json
+import math
+import os
+import pathlib
+import resource
+import struct
+import unittest
+import zipfile
+
+import meshes
+import stack
+from program import MIMAKI, PATIENCE, ProgramTest
+
+CHAIN = ("--fit", "2", "--threads", "2", "!", "dither", "!", "slice-export", "out", "--overwrite", "--quiet")
+BOX = meshes.box((2, 2, 2))
+
+# On any machine, however slow or loaded; what hangs takes longer. What takes memory for what a header says takes more.
+SECONDS = 10
+BYTES = 2 << 30
+
+
+def binary_stl(triangles, count=None, header=b"mm"):
+    records = b"".join(struct.pack("<12fH", 0, 0, 0, *sum(triangle, ()), 0) for triangle in triangles)
+    return header.ljust(80) + struct.pack("<I", len(triangles) if count is None else count) + records
+
+
+def ascii_stl(triangles, end="\n"):
+    lines = ["solid box"]
+    for triangle in triangles:
+        lines += ["facet normal 0 0 0", "outer loop", *(f"vertex {x} {y} {z}" for x, y, z in triangle), "endloop", "endfacet"]
+    return end.join([*lines, "endsolid box", ""]).encode()
+
+
+def corners_and_faces(triangles):
+    corners = sorted(set(sum(triangles, ())))
+    return corners, [[corners.index(corner) for corner in triangle] for triangle in triangles]
+
+
+def obj(triangles, faces=None, end="\n"):
+    corners, own = corners_and_faces(triangles)
+    lines = [f"v {x} {y} {z}" for x, y, z in corners]
+    lines += ["f " + " ".join(str(index + 1) for index in face) for face in (own if faces is None else faces)]
+    return end.join([*lines, ""]).encode()
+
+
+def ply(triangles, vertices=None, faces=None, end="\n"):
+    corners, own = corners_and_faces(triangles)
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(corners) if vertices is None else vertices}",
+             *(f"property float {axis}" for axis in "xyz"), f"element face {len(own) if faces is None else faces}",
+             "property list uchar int vertex_indices", "end_header"]
+    lines += [f"{x} {y} {z}" for x, y, z in corners] + ["3 " + " ".join(map(str, face)) for face in own]
+    return end.join([*lines, ""]).encode()
+
+
+def binary_ply(triangles, list_length=3, index=0):
+    corners, faces = corners_and_faces(triangles)
+    header = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(corners)}\nproperty float x\nproperty float y\n"
+              f"property float z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
+    return (header.encode() + b"".join(struct.pack("<3f", *corner) for corner in corners) +
+            b"".join(struct.pack("<B3i", list_length, *(index + i for i in face)) for face in faces))
+
+
+def spoilt(value):
+    """The box with a coordinate that is no number."""
+    (a, b, c), *rest = BOX
+    return [((value, *a[1:]), b, c), *rest]
+
+
+WHOLE_STL, WHOLE_TEXT, WHOLE_OBJ, WHOLE_PLY = binary_stl(BOX), ascii_stl(BOX), obj(BOX), ply(BOX)
+NAN, INF = math.nan, math.inf
+
+# Files that hold the whole box; whether something is said of them.
+MENDED = {
+    "windows.stl": (ascii_stl(BOX, "\r\n"), False),
+    "old-mac.obj": (obj(BOX, end="\r"), False),
+    "windows.obj": (obj(BOX, end="\r\n"), False),
+    "windows.ply": (ply(BOX, end="\r\n"), False),
+    "no-newline.stl": (WHOLE_TEXT.rstrip(), False),
+    "no-newline.obj": (WHOLE_OBJ.rstrip(), False),
+    "no-newline.ply": (WHOLE_PLY.rstrip(), False),
+    "marked.obj": (b"\xef\xbb\xbf" + WHOLE_OBJ, False),
+    "capitals.stl": (WHOLE_TEXT.upper(), False),
+    "solid-header.stl": (binary_stl(BOX, header=b"solid box"), False),
+    "wrong-name.stl": (WHOLE_OBJ, False),
+    "wrong-name.obj": (WHOLE_STL, False),
+    "count-0.stl": (binary_stl(BOX, 0), True),
+    "count-4G.stl": (binary_stl(BOX, 0xFFFFFFFF), True),
+    "count-too-low.stl": (binary_stl(BOX, 5), True),
+    "more-behind.stl": (WHOLE_STL + b"made by a tool", True),
+    "doubled-face.stl": (binary_stl([*BOX, BOX[0]]), True),
+    "flipped-face.stl": (binary_stl([BOX[0][::-1], *BOX[1:]]), True),
+    "missing-face.stl": (binary_stl(BOX[1:]), True),
+    "inside-out.stl": (binary_stl([triangle[::-1] for triangle in BOX]), True),
+    "flat-face.stl": (binary_stl([*BOX, (BOX[0][0],) * 3]), True),
+}
+
+# Files of which nothing can be made.
+REFUSED = {
+    "empty.stl": b"", "empty.obj": b"", "empty.ply": b"", "blank.obj": b"\n\n \n",
+    "header-only.stl": WHOLE_STL[:84], "half-header.stl": WHOLE_STL[:40], "no-triangles.stl": binary_stl([]),
+    "cut.stl": WHOLE_STL[:-30], "cut-by-one.stl": WHOLE_STL[:-1], "cut-between.stl": WHOLE_STL[:-50],
+    "count-too-high.stl": binary_stl(BOX, 13), "count-2G.stl": binary_stl(BOX, 0x7FFFFFFF),
+    "text-cut.stl": WHOLE_TEXT[:len(WHOLE_TEXT) // 2], "text-empty.stl": b"solid\nendsolid\n", "text-start.stl": b"solid",
+    "text-word.stl": WHOLE_TEXT.replace(b"outer", b"inner", 1), "text-two-corners.stl": WHOLE_TEXT.replace(b"vertex 0 0 0\n", b"", 1),
+    **{f"{name}.{kind}": write(spoilt(value)) for name, value in (("nan", NAN), ("inf", INF), ("minus-inf", -INF))
+       for kind, write in (("stl", binary_stl), ("obj", obj), ("ply", ply), ("text.stl", ascii_stl), ("binary.ply", binary_ply))},
+    "index-0.obj": obj(BOX, [[-1, 1, 2]]), "index-beyond.obj": obj(BOX, [[0, 1, 99]]),
+    "index-4G.obj": obj(BOX, [[0, 1, 1 << 32]]), "index-below.obj": WHOLE_OBJ + b"f -1 -2 -99\n", "index-text.obj": WHOLE_OBJ + b"f a b c\n",
+    "no-faces.obj": obj(BOX, []), "two-corners.obj": obj(BOX, [[0, 1]]), "short-vertex.obj": b"v 1 2\n" + WHOLE_OBJ,
+    "more-vertices.ply": ply(BOX, vertices=9), "fewer-vertices.ply": ply(BOX, vertices=7), "more-faces.ply": ply(BOX, faces=13),
+    "no-faces.ply": ply(BOX, faces=0), "4G-vertices.ply": ply(BOX, vertices=1 << 32), "4G-faces.ply": ply(BOX, faces=1 << 62),
+    "minus-faces.ply": ply(BOX, faces=-1), "no-header-end.ply": WHOLE_PLY.replace(b"end_header\n", b""), "header-only.ply": b"ply\n",
+    "index-beyond.ply": WHOLE_PLY.replace(b"3 0", b"3 9", 1), "list-of-255.ply": binary_ply(BOX, 255), "list-of-0.ply": binary_ply(BOX, 0),
+    "index-beyond.binary.ply": binary_ply(BOX, index=5), "index-below.binary.ply": binary_ply(BOX, index=-1),
+    "cut.ply": WHOLE_PLY[:-20], "cut.binary.ply": binary_ply(BOX)[:-5],
+    "noise.stl": bytes(range(256)) * 4, "zeros.stl": bytes(1000), "text.stl": b"this is no mesh\n", "page.stl": b"<html></html>\n",
+    "broken.3mf": b"PK\x03\x04 and no more", "a.glb": b"glTF\x02\0\0\0", "a.off": b"OFF\n8 12 0\n",
+    "one-triangle.stl": binary_stl(BOX[:1]), "flat.stl": binary_stl([(BOX[0][0],) * 3]),
+}
+
+
+class Malformed(ProgramTest):
+    def limit(self):
+        if not os.environ.get("VDBDITHER_SANITIZER"):
+            # A sanitizer's shadow takes terabytes of addresses.
+            resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
+
+    def outcome(self, mesh):
+        """What was said in a run that ended well, or None after one that was refused as it should be."""
+        before = self.listing()
+        done = self.run_program("mesh2sdf", mesh, *MIMAKI, *CHAIN, timeout=SECONDS * PATIENCE,
+                                preexec_fn=self.limit)
+        said = done.stderr.decode()
+        if done.returncode == 0:
+            for line in said.splitlines():
+                self.assertRegex(line, r"\Avdbdither [a-z0-9-]+: warning: ")
+            manifest = json.loads((self.folder / "out/manifest.json").read_text())
+            printed = sum(material["voxels"] for material in manifest["materials"])
+            self.assertEqual(printed == 0, "warning: no voxel is printed; " in said, said)
+            return said
+        self.assertEqual(done.returncode, 1, said)
+        self.assertRegex(said.splitlines()[-1], r"\Avdbdither mesh2sdf: .*[^.]\Z")
+        errors = [line for line in said.splitlines() if ": warning: " not in line]
+        self.assertEqual(len(errors), 1, said)
+        self.assertEqual(self.listing(), before)
+        return None
+
+    def test_what_can_be_mended_gives_the_slices_of_the_whole_part(self):
+        (self.folder / "whole.stl").write_bytes(WHOLE_STL)
+        self.assertEqual(self.outcome("whole.stl"), "")
+        whole = stack.sums(self.folder / "out")
+        for name, (content, told) in MENDED.items():
+            with self.subTest(name=name):
+                (self.folder / name).write_bytes(content)
+                said = self.outcome(name)
+                self.assertIsNotNone(said)
+                self.assertEqual(said != "", told, said)
+                self.assertEqual(stack.sums(self.folder / "out"), whole)
+
+    def test_what_cannot_be_mended_is_refused(self):
+        for name, content in REFUSED.items():
+            with self.subTest(name=name):
+                (self.folder / name).write_bytes(content)
+                self.assertIsNone(self.outcome(name))
+
+    def test_a_file_cut_anywhere_is_mended_or_refused(self):
+        for kind, content in (("stl", WHOLE_STL), ("text.stl", WHOLE_TEXT), ("obj", WHOLE_OBJ), ("ply", WHOLE_PLY),
+                              ("binary.ply", binary_ply(BOX))):
+            for part in range(1, 8):
+                (self.folder / f"cut.{kind}").write_bytes(content[:len(content) * part // 8])
+                with self.subTest(kind=kind, part=part):
+                    self.outcome(f"cut.{kind}")
+
+    def test_a_part_of_which_nothing_is_left_is_told(self):
+        # One corner is so far away that the rest has no size.
+        (self.folder / "far.stl").write_bytes(binary_stl(spoilt(3e38)))
+        self.assertIn("warning: no voxel is printed; ", self.outcome("far.stl"))
+
+    def test_an_archive_of_a_mesh_is_refused(self):
+        with zipfile.ZipFile(self.folder / "part.3mf", "w") as archive:
+            archive.writestr("3D/3dmodel.model", "<model/>")
+        self.refuse(1, "is not read yet; export STL, OBJ or PLY", "mesh2sdf", "part.3mf", *MIMAKI, *CHAIN)
+
+    @unittest.skipUnless("VDBDITHER_MODELS" in os.environ, "VDBDITHER_MODELS names no folder of models")
+    def test_every_malformed_model_is_mended_or_refused(self):
+        models = sorted((pathlib.Path(os.environ["VDBDITHER_MODELS"]) / "malformed").iterdir())
+        self.assertGreater(len(models), 0)
+        for model in models:
+            with self.subTest(model=model.name):
+                self.outcome(model)
+
+
+if __name__ == "__main__":
+    unittest.main()
