@@ -255,7 +255,9 @@ TEST(SliceExport, AStackWithoutAVoxelIsTold) {
     to.made->setReporter(&listener);
     to.run(job);
     ASSERT_EQ(static_cast<int>(listener.warnings.size()), warnings);
-    if (warnings > 0) EXPECT_THAT(listener.warnings[0], HasSubstr("no voxel is printed"));
+    if (warnings > 0) {
+      EXPECT_THAT(listener.warnings[0], HasSubstr("no voxel is printed"));
+    }
   }
 }
 
