@@ -47,26 +47,29 @@ def table(head, lines):
 
 
 facets = collections.defaultdict(lambda: collections.defaultdict(list))
+every = collections.defaultdict(lambda: collections.defaultdict(list))
 for row in rows:
-    if row["set"] == "facets":
-        facets[row["lattice"], row["spread"], row["tilt"]][row["method"]].append(row)
+    if row["set"] in ("facets", "sweep"):
+        of = facets if row["set"] == "facets" else every
+        of[row["lattice"], row["spread"], row["tilt"]][row["method"]].append(row)
 tilts = sorted({key[2] for key in facets})
 lattices = [name for name in ("mimaki", "j750", "cubic") if any(key[0] == name for key in facets)]
 
 
-def average(key, method, measure="mean"):
-    of = facets[key].get(method)
+def average(key, method, measure="mean", of=facets):
+    of = of[key].get(method)
     return float(np.mean([abs(row[measure]) for row in of])) if of else float("nan")
 
 
-summary = {"facets": [], "smooth": [], "detail": []}
-for key in sorted(facets):
-    for method in facets[key]:
-        entry = {"lattice": key[0], "spread_um": key[1], "tilt": key[2], "method": method}
-        for measure in MEASURES:
-            entry[measure + "_um"] = round(average(key, method, measure), 3)
-        entry["greatest_mean_um"] = round(max(row["mean"] for row in facets[key][method]), 3)
-        summary["facets"].append(entry)
+summary = {"facets": [], "sweep": [], "smooth": [], "detail": []}
+for name, of in (("facets", facets), ("sweep", every)):
+    for key in sorted(of):
+        for method in of[key]:
+            entry = {"lattice": key[0], "spread_um": key[1], "tilt": key[2], "method": method}
+            for measure in MEASURES:
+                entry[measure + "_um"] = round(average(key, method, measure, of), 3)
+            entry["greatest_mean_um"] = round(max(row["mean"] for row in of[key][method]), 3)
+            summary[name].append(entry)
 
 for lattice in lattices:
     for spread in (50, 100):
@@ -112,18 +115,25 @@ if facets:
     figure.tight_layout(rect=(0, 0, 1, 0.96))
     save(figure, "tilts.png")
 
-sweep = ["control", "0.5 voxel", "1 voxel", "1.5 voxel", "2 voxel", "2.5 foot", "3 foot", "4 foot", "5 foot", "6 foot"]
-if any("3 foot" in methods for methods in facets.values()):
+for method in SHOWN:
+    of = [row["mean"] for methods in facets.values() for row in methods.get(method, [])]
+    if of:
+        print(f"{method}: {np.mean(of):.2f} µm on average over {len(of)} combinations")
+print()
+
+constants = ["control", "0.5 voxel", "1 voxel", "1.5 voxel", "2 voxel", "2.5 foot", "3 foot", "4 foot", "5 foot", "6 foot",
+             "triangular 2", "coverage", "4 closest", "4 voxel", "2 closest", "2 voxel, paper's mask", "paper",
+             "best, paper's mask", "best 25", "best", "best 100"]
+if every:
+    shown = sorted({key[2] for key in every})
     for spread in (50, 100):
-        print(f"### mimaki, σ = {spread} µm, by constant: mean error, µm\n")
-        shown = [t for t in tilts if not np.isnan(average(("mimaki", spread, t), "3 foot"))]
-        extra = ["triangular 2", "coverage", "4 voxel", "paper", "2 closest", "best 25", "best", "best 100"]
+        print(f"### mimaki, σ = {spread} µm, by rule: mean error, µm\n")
         table(["rule"] + [f"{t:g}°" for t in shown],
-              [[m] + [f"{average(('mimaki', spread, t), m):.2f}" for t in shown] for m in sweep + extra])
+              [[m] + [f"{average(('mimaki', spread, t), m, of=every):.2f}" for t in shown] for m in constants])
     for measure, title in (("stairs", "residual staircase"), ("modulation", "noise modulation")):
         print(f"### mimaki, σ = 50 µm: {title}, µm\n")
-        table(["rule"] + [f"{t:g}°" for t in tilts],
-              [[m] + [f"{average(('mimaki', 50, t), m, measure):.2f}" for t in tilts]
+        table(["rule"] + [f"{t:g}°" for t in shown],
+              [[m] + [f"{average(('mimaki', 50, t), m, measure, every):.2f}" for t in shown]
                for m in ["control", "interlacing", "1 voxel", "2 voxel", "triangular 2", "3 foot", "4 foot", "paper", "best"]])
 
 smooth = [row for row in rows if row["set"] == "smooth"]
@@ -151,7 +161,8 @@ for row in rows:
         summary["detail"].append({k: v for k, v in row.items() if k != "set"})
 METHODS = SHOWN + ["best unguarded", "2 voxel", "coverage"]
 for piece, what in (("plate", "volume_error_percent"), ("wires", "volume_error_percent"),
-                    ("comb", "components"), ("plate", "components"), ("wires", "components"),
+                    ("wires", "stroke_volume_error_percent"), ("wires", "stroke_overlap"),
+                    ("comb", "components"), ("plate", "components"), ("wires", "components"), ("plate", "tunnels"),
                     ("embossed", "stroke_volume_error_percent"), ("embossed", "stroke_overlap"),
                     ("engraved", "stroke_volume_error_percent"), ("engraved", "stroke_overlap")):
     keys = sorted(key for key in details if key[1] == piece)
@@ -163,7 +174,7 @@ for piece, what in (("plate", "volume_error_percent"), ("wires", "volume_error_p
         cells = []
         for method in METHODS:
             values = [row[what] for row in details[key].get(method, [])]
-            if what == "components":
+            if what in ("components", "tunnels"):
                 cells.append(", ".join(str(v) for v in values))
             elif what.endswith("percent"):
                 cells.append(", ".join(f"{v:+.1f}" for v in values))
@@ -174,7 +185,7 @@ for piece, what in (("plate", "volume_error_percent"), ("wires", "volume_error_p
 
 heights = [row for row in rows if row["set"] == "heights"]
 if heights:
-    methods = list(dict.fromkeys(row["method"] for row in heights))
+    methods = list(dict.fromkeys(SHOWN + [row["method"] for row in heights]))
     figure, axes = plt.subplots(len(methods), 2, figsize=(8, 1.9 * len(methods)))
     for row in heights:
         ax = axes[methods.index(row["method"]), 0 if row["axis"] == 2 else 1]

@@ -4,12 +4,15 @@
 // Prints one JSON object per line; samples/paper/quality.py makes the tables of docs/evaluation.md
 // of them.
 //
-//     dither_quality_bench MASK.vdb facets|sweep|heights|smooth|detail [NAME OF THE MASK [METHOD]]
+//     dither_quality_bench MASK.vdb PAPERS_MASK.vdb facets|sweep|heights|smooth|detail [LATTICE
+//     [RULE]]
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <iostream>
+#include <map>
 #include <numbers>
 #include <random>
 
@@ -39,6 +42,14 @@ const std::vector<NamedLattice> lattices{{"mimaki", {0.042, 0.084, 0.022}},
                                          {"j750", {25.4 / 600, 25.4 / 300, 0.027}},
                                          {"cubic", {0.05, 0.05, 0.05}}};
 constexpr std::array spreads_mm{0.05, 0.1};
+
+/// That one, or all without a name.
+std::vector<NamedLattice> latticesNamed(const std::string& only) {
+  std::vector<NamedLattice> named = lattices;
+  std::erase_if(named,
+                [&](const NamedLattice& lattice) { return !only.empty() && lattice.name != only; });
+  return named;
+}
 
 /// Occupancy after the blur, exact for voxels that are boxes.
 class Blurred {
@@ -96,9 +107,14 @@ class Blurred {
     const auto below = [&](int n) {
       return std::erf(((first + n - 0.5) * pitch - at_mm) / spread_mm_ / std::numbers::sqrt2) / 2;
     };
-    const double all = below(2 * reach + 1) - below(0);
-    for (int n = 0; n <= 2 * reach; ++n)
-      weights[static_cast<std::size_t>(n)] = static_cast<float>((below(n + 1) - below(n)) / all);
+    const double least = below(0);
+    const double all = below(2 * reach + 1) - least;
+    double before = least;
+    for (int n = 0; n <= 2 * reach; ++n) {
+      const double after = below(n + 1);
+      weights[static_cast<std::size_t>(n)] = static_cast<float>((after - before) / all);
+      before = after;
+    }
     return first;
   }
 
@@ -145,12 +161,19 @@ Method ruled(const std::string& name, Rule rule) {
           }};
 }
 
+/// Made once for each lattice and spread.
+std::shared_ptr<const AdaptedAmplitude> adaptedTo(const Vec3d& pitch_mm, double spread_mm) {
+  static std::map<std::array<double, 4>, std::shared_ptr<const AdaptedAmplitude>> known;
+  auto& adapted = known[{pitch_mm.x(), pitch_mm.y(), pitch_mm.z(), spread_mm}];
+  if (!adapted) adapted = std::make_shared<AdaptedAmplitude>(pitch_mm, spread_mm);
+  return adapted;
+}
+
 Method dithered(const std::string& name, const ThresholdMask& mask, double amplitude, DitherAt at,
                 bool adapted = false, bool guarded = false, double spread_mm = 0.05) {
   return {name, [=](const Part& part, const FloatGrid& surface) {
             ShapeDither dither{part.lattice.pitch_mm, amplitude, at, mask};
-            if (adapted)
-              dither.adapted = std::make_shared<AdaptedAmplitude>(part.lattice.pitch_mm, spread_mm);
+            if (adapted) dither.adapted = adaptedTo(part.lattice.pitch_mm, spread_mm);
             dither.guarded = guarded;
             const ZRange layers = part.lattice.layers();
             return test::dense(*dither.run(surface, nullptr, layers, layers, false).solid,
@@ -250,11 +273,30 @@ class Errors {
   std::array<Moments, 16> phases_;
 };
 
-std::vector<Method> methodsFor(const ThresholdMask& mask, bool every) {
+/// Ours, and what the paper's rule takes.
+struct Masks {
+  ThresholdMask ours;
+  ThresholdMask papers;
+};
+
+/// Not all that are in the tables, but this one; all if empty.
+std::string only_method;
+
+std::vector<Method> chosen(std::vector<Method> methods) {
+  if (!only_method.empty())
+    std::erase_if(methods, [](const Method& method) { return method.name != only_method; });
+  return methods;
+}
+
+std::vector<Method> methodsFor(const Masks& masks, bool every) {
+  const ThresholdMask& mask = masks.ours;
   std::vector<Method> methods{control(), interlacing(),
-                              dithered("paper", mask, 4, DitherAt::closest),
+                              dithered("paper", masks.papers, 4, DitherAt::closest),
                               dithered("best", mask, 2, DitherAt::voxel, true, true)};
   if (!every) return methods;
+  methods.push_back(dithered("best, paper's mask", masks.papers, 2, DitherAt::voxel, true, true));
+  methods.push_back(dithered("4 closest", mask, 4, DitherAt::closest));
+  methods.push_back(dithered("2 voxel, paper's mask", masks.papers, 2, DitherAt::voxel));
   methods.push_back(dithered("4 foot", mask, 4, DitherAt::foot));
   methods.push_back(dithered("4 voxel", mask, 4, DitherAt::voxel));
   for (const double amplitude : {0.5, 1.0, 1.5, 2.0})
@@ -271,16 +313,20 @@ std::vector<Method> methodsFor(const ThresholdMask& mask, bool every) {
   return methods;
 }
 
-/// Strips of flat facets, 3.2 × 1 mm, `tilt` degrees off an axis of the lattice towards `azimuth`.
-void facets(const ThresholdMask& mask, const std::string& mask_name, bool every) {
-  constexpr int positions = 3;
+/// Strips of flat facets, 3.2 × 1 mm, `tilt` degrees off an axis of the lattice towards `azimuth`;
+/// for every rule fewer of them.
+void facets(const Masks& masks, const std::string& only, bool every) {
+  const int positions = every ? 1 : 3;
+  const std::vector<double> tilts =
+      every ? std::vector{0.5, 2.0, 5.0, 10.0, 20.0, 45.0}
+            : std::vector{0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0};
   const Vec3d half(1.6, 0.5, 0);
-  const auto methods = methodsFor(mask, every);
-  for (const auto& [name, pitch] : lattices) {
+  const auto methods = chosen(methodsFor(masks, every));
+  for (const auto& [name, pitch] : latticesNamed(only)) {
     for (int a = 0; a < 3; ++a) {
       if (std::strcmp(name, "cubic") == 0 && a != 2) continue;
       for (const double azimuth : {3.0, 40.0, 87.0}) {
-        for (const double tilt : {0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0}) {
+        for (const double tilt : tilts) {
           const int b = (a + 1) % 3;
           const int c = (a + 2) % 3;
           const double t = tilt * pi / 180;
@@ -327,7 +373,7 @@ void facets(const ThresholdMask& mask, const std::string& mask_name, bool every)
           }
           for (std::size_t m = 0; m < methods.size(); ++m) {
             for (std::size_t s = 0; s < 2; ++s) {
-              std::cout << "{\"set\":\"facets\",\"mask\":\"" << mask_name << "\",\"lattice\":\""
+              std::cout << "{\"set\":\"" << (every ? "sweep" : "facets") << "\",\"lattice\":\""
                         << name << "\",\"axis\":" << a << ",\"azimuth\":" << azimuth
                         << ",\"tilt\":" << tilt << ",\"spread\":" << 1000 * spreads_mm[s]
                         << ",\"method\":\"" << methods[m].name
@@ -344,10 +390,11 @@ void facets(const ThresholdMask& mask, const std::string& mask_name, bool every)
 }
 
 /// The printed heights, µm, over 4 × 2 mm of facets 2° off z and off y, at points 40 µm apart.
-void heights(const ThresholdMask& mask) {
-  auto methods = methodsFor(mask, false);
-  methods.push_back(dithered("4 foot", mask, 4, DitherAt::foot));
-  methods.push_back(dithered("2 voxel", mask, 2, DitherAt::voxel));
+void heights(const Masks& masks) {
+  auto methods = methodsFor(masks, false);
+  methods.push_back(dithered("4 foot", masks.ours, 4, DitherAt::foot));
+  methods.push_back(dithered("2 voxel, paper's mask", masks.papers, 2, DitherAt::voxel));
+  methods = chosen(std::move(methods));
   const Vec3d pitch = lattices[0].pitch_mm;
   for (const int a : {2, 1}) {
     const double tilt = 2 * pi / 180;
@@ -413,7 +460,27 @@ double reliefDistance(const Vec3d& at) {
 int cavities(const Voxels& printed) {
   Voxels empty(printed.box(), 0);
   for (auto v = printed.box().begin(); v; ++v) empty[*v] = printed[*v] ? 0 : 1;
-  return test::components(empty, test::Touching::corners) - 1;
+  return test::components(empty, test::Touching::faces) - 1;
+}
+
+/// Handles of the printed set, its voxels taken with faces, edges and corners: by Euler's number.
+int tunnels(const Voxels& printed) {
+  const CoordBBox& box = printed.box();
+  int euler = 0;
+  // Every cell of the cubic complex is counted at its lowest corner: a voxel, or what the voxels
+  // around it hold of it.
+  for (auto v = CoordBBox(box.min(), box.max().offsetBy(1)).begin(); v; ++v) {
+    for (int kind = 0; kind < 8; ++kind) {
+      // Bits: the axes along which the cell is flat.
+      bool held = false;
+      for (int around = 0; around < 8 && !held; ++around) {
+        if ((around & ~kind) != 0) continue;
+        held = printed.at((*v).offsetBy(-(around & 1), -(around >> 1 & 1), -(around >> 2)), 0) != 0;
+      }
+      if (held) euler += std::popcount(static_cast<unsigned>(kind)) % 2 == 0 ? -1 : 1;
+    }
+  }
+  return test::components(printed, test::Touching::corners) + cavities(printed) - euler;
 }
 
 double volumeMm3(const Voxels& printed, const Vec3d& pitch_mm) {
@@ -422,10 +489,10 @@ double volumeMm3(const Voxels& printed, const Vec3d& pitch_mm) {
   return count * pitch_mm.product();
 }
 
-void smooth(const ThresholdMask& mask, const std::string& mask_name) {
-  const auto methods = methodsFor(mask, false);
+void smooth(const Masks& masks, const std::string& only) {
+  const auto methods = chosen(methodsFor(masks, false));
   constexpr double radius = 1.5;
-  for (const auto& [name, pitch] : lattices) {
+  for (const auto& [name, pitch] : latticesNamed(only)) {
     for (const std::string shape : {"sphere", "relief"}) {
       const bool sphere = shape == "sphere";
       const Vec3d centre(0.011, 0.027, 0.005);
@@ -467,9 +534,9 @@ void smooth(const ThresholdMask& mask, const std::string& mask_name) {
             }
             errors.add(blurred.error(x, normal) - expected, x.z() / pitch.z() + 0.5);
           }
-          std::cout << "{\"set\":\"smooth\",\"mask\":\"" << mask_name << "\",\"lattice\":\"" << name
-                    << "\",\"shape\":\"" << shape << "\",\"spread\":" << 1000 * spread_mm
-                    << ",\"method\":\"" << method.name << "\",";
+          std::cout << "{\"set\":\"smooth\",\"lattice\":\"" << name << "\",\"shape\":\"" << shape
+                    << "\",\"spread\":" << 1000 * spread_mm << ",\"method\":\"" << method.name
+                    << "\",";
           if (sphere) {
             const double truth = 4 * pi / 3 * radius * radius * radius;
             std::cout << "\"volume_error_percent\":"
@@ -541,6 +608,34 @@ struct Detail {
 
 std::vector<Detail> detailsOn(const Vec3d& pitch) {
   std::vector<Detail> details;
+  for (const double um : {80.0, 120.0, 180.0, 250.0}) {
+    const double r = um / 2000;
+    const Distance wires = joined({capsule({-0.9, -0.5, 0.1}, {0.9, -0.4, 0.2}, r),
+                                   capsule({-0.9, 0.1, -0.5}, {0.9, 0.2, 0.4}, r),
+                                   capsule({0.1, -0.9, -0.9}, {-0.2, 0.8, -0.7}, r),
+                                   capsule({0.7, 0.7, -0.8}, {0.6, 0.75, 0.9}, r)});
+    details.push_back(
+        {"wires", um, {wires, latticeOver(pitch, Vec3d(-1.5), Vec3d(1.5))}, [=](const Vec3d& x) {
+           return wires(x) - 0.15;
+         }});
+  }
+  for (const double um : {76.0, 120.0, 180.0, 280.0}) {
+    const double w = um / 1000;
+    const double size = std::max(0.5, 4 * w);
+    const Vec3d min(-1.9 * size, -0.7 * size, -0.5);
+    const Vec3d max(2.3 * size, 1.7 * size, 0.7);
+    const Lattice lattice = latticeOver(pitch, min - 0.4, max + 0.4);
+    const Distance slab =
+        test::box({0.2 * size, 0.5 * size, -0.25}, {1.9 * size, size, 0.25}, Vec3d(0.0));
+    const Distance raised = letters(w, 0.2);
+    const Distance sunk = letters(w, 0.15);
+    details.push_back({"embossed", um, {joined({slab, raised}), lattice}, [=](const Vec3d& x) {
+                         return std::max(0.03 - x.z(), raised(x) - 0.08);
+                       }});
+    details.push_back({"engraved", um, {cut(slab, sunk), lattice}, [=](const Vec3d& x) {
+                         return std::max(x.z() + 0.0, sunk(x) - 0.08);
+                       }});
+  }
   const Vec3d tilt_of_plates[] = {{3, 4, 0}, {20, 11, 0}, {40, 5, 30}, {88, 0, 2}, {3, 87, 10}};
   for (const Vec3d& tilt : tilt_of_plates) {
     const Vec3d half(0.8, 0.7, 1);
@@ -573,45 +668,16 @@ std::vector<Detail> detailsOn(const Vec3d& pitch) {
           {"comb", voxels, {joined(bars), latticeOver(pitch, Vec3d(-1.6), Vec3d(1.6))}, {}});
     }
   }
-  for (const double um : {80.0, 120.0, 180.0, 250.0}) {
-    const double r = um / 2000;
-    details.push_back({"wires",
-                       um,
-                       {joined({capsule({-0.9, -0.5, 0.1}, {0.9, -0.4, 0.2}, r),
-                                capsule({-0.9, 0.1, -0.5}, {0.9, 0.2, 0.4}, r),
-                                capsule({0.1, -0.9, -0.9}, {-0.2, 0.8, -0.7}, r),
-                                capsule({0.7, 0.7, -0.8}, {0.6, 0.75, 0.9}, r)}),
-                        latticeOver(pitch, Vec3d(-1.5), Vec3d(1.5))},
-                       {}});
-  }
-  for (const double um : {76.0, 120.0, 180.0, 280.0}) {
-    const double w = um / 1000;
-    const double size = std::max(0.5, 4 * w);
-    const Vec3d min(-1.9 * size, -0.7 * size, -0.5);
-    const Vec3d max(2.3 * size, 1.7 * size, 0.7);
-    const Lattice lattice = latticeOver(pitch, min - 0.4, max + 0.4);
-    const Distance slab =
-        test::box({0.2 * size, 0.5 * size, -0.25}, {1.9 * size, size, 0.25}, Vec3d(0.0));
-    const Distance raised = letters(w, 0.2);
-    const Distance sunk = letters(w, 0.15);
-    details.push_back({"embossed", um, {joined({slab, raised}), lattice}, [=](const Vec3d& x) {
-                         return std::max(0.03 - x.z(), raised(x) - 0.08);
-                       }});
-    details.push_back({"engraved", um, {cut(slab, sunk), lattice}, [=](const Vec3d& x) {
-                         return std::max(x.z() + 0.0, sunk(x) - 0.08);
-                       }});
-  }
   return details;
 }
 
-void detail(const ThresholdMask& mask, const std::string& mask_name, const std::string& only) {
-  std::vector<Method> methods = methodsFor(mask, false);
-  methods.push_back(dithered("best unguarded", mask, 2, DitherAt::voxel, true, false));
-  methods.push_back(dithered("2 voxel", mask, 2, DitherAt::voxel));
-  methods.push_back(coverage(mask));
-  if (!only.empty())
-    std::erase_if(methods, [&](const Method& method) { return method.name != only; });
-  for (const auto& [name, pitch] : lattices) {
+void detail(const Masks& masks, const std::string& only) {
+  std::vector<Method> methods = methodsFor(masks, false);
+  methods.push_back(dithered("best unguarded", masks.ours, 2, DitherAt::voxel, true, false));
+  methods.push_back(dithered("2 voxel", masks.ours, 2, DitherAt::voxel));
+  methods.push_back(coverage(masks.ours));
+  methods = chosen(std::move(methods));
+  for (const auto& [name, pitch] : latticesNamed(only)) {
     for (const Detail& piece : detailsOn(pitch)) {
       const auto surface = surfaceOf(piece.part);
       double truth = 0;
@@ -634,16 +700,17 @@ void detail(const ThresholdMask& mask, const std::string& mask_name, const std::
         truth += static_cast<double>(covered) / (fine * fine * fine);
       }
       for (const Method& method : methods) {
+        // Sub-samples of so many voxels take long, and say nothing new of plates.
+        if (!piece.region && method.name == "coverage") continue;
         const Voxels printed = method.print(piece.part, *surface);
         double count = 0;
         for (auto v = box.begin(); v; ++v)
           count += printed[*v] && inRegion(piece.part.lattice.position(*v)) ? 1 : 0;
-        std::cout << "{\"set\":\"detail\",\"mask\":\"" << mask_name << "\",\"lattice\":\"" << name
-                  << "\",\"piece\":\"" << piece.name << "\",\"size\":" << piece.size_um
-                  << ",\"method\":\"" << method.name
+        std::cout << "{\"set\":\"detail\",\"lattice\":\"" << name << "\",\"piece\":\"" << piece.name
+                  << "\",\"size\":" << piece.size_um << ",\"method\":\"" << method.name
                   << "\",\"volume_error_percent\":" << 100 * (count / truth - 1)
                   << ",\"components\":" << test::components(printed, test::Touching::corners)
-                  << ",\"cavities\":" << cavities(printed);
+                  << ",\"cavities\":" << cavities(printed) << ",\"tunnels\":" << tunnels(printed);
         if (piece.region) {
           // After the blur, at points 25 µm apart.
           const Blurred blurred(printed, pitch, spreads_mm[0]);
@@ -655,12 +722,12 @@ void detail(const ThresholdMask& mask, const std::string& mask_name, const std::
           const Vec3d high = piece.part.lattice.position(box.max()) - 0.35;
           for (double x = low.x(); x < high.x(); x += 0.025) {
             for (double y = low.y(); y < high.y(); y += 0.025) {
-              for (double z = -0.2; z < 0.3; z += 0.025) {
+              for (double z = low.z(); z < high.z(); z += 0.025) {
                 const Vec3d at(x, y, z);
                 if (!inRegion(at)) continue;
                 const bool is = piece.part.distance(at) < 0;
                 const bool made = blurred(at) > 0.5;
-                const bool stroke = piece.name == "embossed";
+                const bool stroke = piece.name != "engraved";
                 both += (is == stroke) && (made == stroke);
                 either += (is == stroke) || (made == stroke);
                 after += made == stroke;
@@ -682,19 +749,23 @@ void detail(const ThresholdMask& mask, const std::string& mask_name, const std::
 
 int main(int argc, char** argv) {
   using namespace vdbdither;
-  if (argc < 3) {
-    std::cerr << "usage: dither_quality_bench MASK.vdb facets|sweep|heights|smooth|detail [NAME "
-                 "[METHOD]]\n";
+  if (argc < 4) {
+    std::cerr << "usage: dither_quality_bench MASK.vdb PAPERS_MASK.vdb "
+                 "facets|sweep|heights|smooth|detail [mimaki|j750|cubic "
+                 "[RULE]]\n";
     return 2;
   }
   initializeVdb();
-  const ThresholdMask mask(
-      *openvdb::gridConstPtrCast<openvdb::FloatGrid>(readGrid(argv[1], "mask")));
-  const std::string what = argv[2];
-  const std::string name = argc > 3 ? argv[3] : "default";
-  if (what == "facets") facets(mask, name, false);
-  if (what == "sweep") facets(mask, name, true);
-  if (what == "heights") heights(mask);
-  if (what == "smooth") smooth(mask, name);
-  if (what == "detail") detail(mask, name, argc > 4 ? argv[4] : "");
+  const auto read = [](const char* path) {
+    return ThresholdMask(*openvdb::gridConstPtrCast<openvdb::FloatGrid>(readGrid(path, "mask")));
+  };
+  const Masks masks{read(argv[1]), read(argv[2])};
+  const std::string what = argv[3];
+  const std::string only = argc > 4 ? argv[4] : "";
+  if (argc > 5) only_method = argv[5];
+  if (what == "facets") facets(masks, only, false);
+  if (what == "sweep") facets(masks, only, true);
+  if (what == "heights") heights(masks);
+  if (what == "smooth") smooth(masks, only);
+  if (what == "detail") detail(masks, only);
 }
