@@ -109,8 +109,8 @@ def draw(shape, process, names):
 parts.write_stl(work / "cube.stl", parts.cube(10.0))
 parts.write_stl(work / "sphere.stl", parts.sphere(4.0))
 tables, summary = {}, {"about": "means over the object's pixels, seen from 50 cm at 50 cycles per degree; mean: over two views "
-                                "and three lights; chance: greatest change by a second seed of the thresholds, after droplets; rays: the part "
-                                "beside itself with a second pattern of rays", "shapes": {}}
+                                "and three lights; chance: greatest change by a second seed of the thresholds, after droplets; "
+                                "rays: the part beside itself with a second pattern of rays", "shapes": {}}
 for shape in ("cube", "sphere"):
     tables[shape], out = {}, {}
     for process in PROCESSES:
@@ -130,10 +130,12 @@ rows = ["| | " + " | ".join(f"{shape}, {process}" for shape in tables for proces
 for name in METHODS:
     rows.append(f"| {name} | " + " | ".join(" / ".join(f"{mean(tables[shape][process][name])[key]:.3f}" for key in FIGURES)
                                             for shape in tables for process in PROCESSES) + " |")
-chance = {key: max(summary["shapes"][shape]["chance"][key] for shape in tables) for key in FIGURES}
-rows.append("\nTwo seeds of the thresholds differ in any one picture by at most " + ", ".join(
-    f"{value:.3f} ({FIGURES[key]})" for key, value in chance.items()) + ".\nThe part beside itself under another pattern of rays: " +
-    "; ".join(f"{shape} " + " / ".join(f"{summary['shapes'][shape]['rays'][key]:.3f}" for key in FIGURES) for shape in tables) + ".")
+chance = {key: max(of["chance"][key] for of in summary["shapes"].values()) for key in FIGURES}
+rows.append("\nTwo seeds of the thresholds differ in any one picture by at most "
+            + ", ".join(f"{value:.3f} ({FIGURES[key]})" for key, value in chance.items())
+            + ".\nThe part beside itself under another pattern of rays: "
+            + "; ".join(f"{shape} " + " / ".join(f"{of['rays'][key]:.3f}" for key in FIGURES)
+                        for shape, of in summary["shapes"].items()) + ".")
 page = result / "figure-9.md"
 text = page.read_text() if page.exists() else "# The paper's figure 9: how prints look\n\n<!-- tables -->\n"
 page.write_text(text.split("<!-- tables -->")[0] + "<!-- tables -->\n\n" + "\n".join(rows) + "\n")

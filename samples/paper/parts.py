@@ -76,8 +76,8 @@ def figurine():
     spacing = 0.08
     low, high = numpy.array([-5.2, -6.0, -0.4]), numpy.array([5.2, 6.0, 16.4])
     count = numpy.ceil((high - low) / spacing).astype(int)
-    x, y, z = (low[axis] + spacing * numpy.arange(count[axis], dtype=numpy.float32).reshape([-1 if a == axis else 1 for a in range(3)])
-               for axis in range(3))
+    x, y, z = numpy.ogrid[tuple(slice(0, n) for n in count)]
+    x, y, z = (start + spacing * line.astype(numpy.float32) for start, line in zip(low, (x, y, z)))
 
     def ball(centre, radii):
         scaled = numpy.sqrt(sum(((p - c) / r) ** 2 for p, c, r in zip((x, y, z), centre, radii)))

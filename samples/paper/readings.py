@@ -253,7 +253,8 @@ def by_program():
 
 
 def page(reference_table, program_table):
-    yield "| reading | 2° | 10° | 30° | sphere | bias | components | by faces | cavities |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    yield "| reading | 2° | 10° | 30° | sphere | bias | components | by faces | cavities |"
+    yield "| --- " * 9 + "|"
     for name, row in reference_table.items():
         figures = [f"{row[key]:.2f}" for key in ("2 degrees", "10 degrees", "30 degrees", "sphere")]
         lists = [", ".join(map(str, row[key])) for key in ("components", "by faces", "cavities")]
@@ -261,12 +262,13 @@ def page(reference_table, program_table):
     yield "\nBy the program: mean error / 99th percentile / bias in µm, components / cavities:\n"
     yield "| `dither --preset paper`, | cube of 8 mm, 2° | sphere of 5 mm |\n| --- | --- | --- |"
     for name, row in program_table.items():
-        yield f"| {name} | " + " | ".join(f"{of['mean']:.2f} / {of['p99']:.1f} / {of['bias']:+.2f}, {of['components']} / {of['cavities']}"
-                                          for of in row.values()) + " |"
+        yield f"| {name} | " + " | ".join(f"{of['mean']:.2f} / {of['p99']:.1f} / {of['bias']:+.2f}, "
+                                          f"{of['components']} / {of['cavities']}" for of in row.values()) + " |"
 
 
 tables = reference(), by_program()
-(result / "readings.json").write_text(json.dumps({"reference": tables[0], "program": tables[1]}, indent=1, ensure_ascii=False) + "\n")
+(result / "readings.json").write_text(json.dumps({"reference": tables[0], "program": tables[1]}, indent=1,
+                                          ensure_ascii=False) + "\n")
 path = result / "readings.md"
 text = path.read_text() if path.exists() else "# Where the paper can be read in two ways\n\n<!-- tables -->\n"
 path.write_text(text.split("<!-- tables -->")[0] + "<!-- tables -->\n\n" + "\n".join(page(*tables)) + "\n")

@@ -44,8 +44,8 @@ class Paper(ProgramTest):
         done = subprocess.run([PAPER / "reproduce.sh", "figure"], capture_output=True, text=True, cwd=self.folder,
                               env={"PATH": "/usr/bin:/bin", "WORK": str(self.folder), "RESULT": str(self.folder)}, timeout=60)
         self.assertEqual(done.returncode, 2)
-        self.assertEqual(done.stderr, "reproduce.sh: there is no step 'figure'; there are figure8 figure9 readings pictures speed masks "
-                         "default\n")
+        self.assertEqual(done.stderr, "reproduce.sh: there is no step 'figure'; there are figure8 figure9 readings "
+                         "pictures speed masks default\n")
 
 
 if __name__ == "__main__":
