@@ -24,10 +24,6 @@ constexpr std::array<Lanes, 16> lanes_by_bits = [] {
   return lanes;
 }();
 
-inline float oneOf(float value, bool held) {
-  return held ? value : std::copysign(std::numeric_limits<float>::infinity(), value);
-}
-
 /// Four values, those without a bit as the infinity of their sign.
 inline void copyFour(float* out, const float* in, unsigned bits) {
 #ifdef __SSE2__
@@ -36,7 +32,10 @@ inline void copyFour(float* out, const float* in, unsigned bits) {
   const __m128 none = _mm_set1_ps(std::numeric_limits<float>::infinity());
   _mm_storeu_ps(out, _mm_or_ps(kept, _mm_andnot_ps(held, none)));
 #else
-  for (unsigned lane = 0; lane < 4; ++lane) out[lane] = oneOf(in[lane], (bits >> lane & 1U) != 0);
+  for (unsigned lane = 0; lane < 4; ++lane) {
+    const bool held = (bits >> lane & 1U) != 0;
+    out[lane] = held ? in[lane] : std::copysign(std::numeric_limits<float>::infinity(), in[lane]);
+  }
 #endif
 }
 
