@@ -136,6 +136,17 @@ class LayerCopy {
   ZRange range_;
 };
 
+/// Copies the layers of all `pieces` within `wanted` into a grid of their type that has nothing
+/// there yet.
+template <typename GridT>
+void copyLayers(std::span<const Layers> pieces, ZRange wanted, GridT& target) {
+  for (const Layers& piece : pieces) {
+    const ZRange range = intersection(piece.range, wanted);
+    if (!range.empty())
+      LayerCopy(static_cast<const GridT&>(*piece.grid).tree(), target.tree(), range).run();
+  }
+}
+
 /// Whether an internal node has nothing but background outside `range`.
 template <typename Node, typename Value>
 bool endsWithin(const Node& node, ZRange range, const Value& background) {
@@ -177,12 +188,7 @@ GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted) {
   visitGrid(*pieces.front().grid, [&](const auto& first) {
     using GridT = std::decay_t<decltype(first)>;
     const auto joined = openvdb::gridPtrCast<GridT>(first.copyGridWithNewTree());
-    for (const Layers& piece : pieces) {
-      const ZRange range = intersection(piece.range, wanted);
-      if (range.empty()) continue;
-      const auto& grid = static_cast<const GridT&>(*piece.grid);
-      LayerCopy(grid.tree(), joined->tree(), range).run();
-    }
+    copyLayers(pieces, wanted, *joined);
     result = joined;
   });
   return result;
@@ -192,14 +198,8 @@ bool addLayers(GridBase& grid, ZRange own, std::span<const Layers> pieces, ZRang
   bool could = true;
   visitGrid(grid, [&](const auto& typed) {
     using GridT = std::decay_t<decltype(typed)>;
-    auto& target = static_cast<GridT&>(grid).tree();
-    could = endsWithin(target, alignedToLeaves(own));
-    if (!could) return;
-    for (const Layers& piece : pieces) {
-      const ZRange range = intersection(piece.range, wanted);
-      if (!range.empty())
-        LayerCopy(static_cast<const GridT&>(*piece.grid).tree(), target, range).run();
-    }
+    could = endsWithin(typed.tree(), alignedToLeaves(own));
+    if (could) copyLayers(pieces, wanted, static_cast<GridT&>(grid));
   });
   return could;
 }
