@@ -31,6 +31,11 @@ inline constexpr LeafBits no_bits{};
 /// A word whose rows along z are all `row`.
 constexpr std::uint64_t everyRow(std::uint8_t row) { return 0x0101010101010101U * row; }
 
+/// `core` and so many layers around it, cut at `valid`.
+inline ZRange grownWithin(ZRange core, int layers, ZRange valid) {
+  return intersection({core.begin - layers, core.end + layers}, valid);
+}
+
 /// The rows of a leaf whose lowest layer is `leaf_z`, cut to the layers that `layers` holds.
 inline std::uint8_t rowWithin(int leaf_z, ZRange layers) {
   const int begin = std::clamp(layers.begin - leaf_z, 0, leaf_layers);

@@ -239,10 +239,6 @@ struct Nowhere {
   float operator()(unsigned, float) { return 0; }
 };
 
-ZRange grownWithin(ZRange core, int layers, ZRange valid) {
-  return intersection({core.begin - layers, core.end + layers}, valid);
-}
-
 }  // namespace
 
 openvdb::FloatGrid::Ptr makeDisplacedGrid(const openvdb::FloatGrid& surface) {

@@ -26,10 +26,6 @@ namespace {
 
 using Accessor = openvdb::tree::ValueAccessor<const FloatTree, false>;
 
-ZRange grownWithin(ZRange core, int layers, ZRange valid) {
-  return intersection({core.begin - layers, core.end + layers}, valid);
-}
-
 /// h at a voxel or at a point. For one thread.
 class Heights {
  public:
