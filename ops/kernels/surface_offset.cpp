@@ -142,8 +142,8 @@ FloatGrid::Ptr SurfaceOffset::run(const FloatGrid& surface, const FloatGrid* hei
     displace([&] { return Constant{constant_mm}; });
   } else if (at == At::foot) {
     struct AtFoot {
-      const SurfaceOffset& offset;
       LeafNormals normals;
+      const SurfaceOffset& offset;
       std::shared_ptr<Heights> heights;
       const FloatLeaf* leaf = nullptr;
       void visit(const FloatLeaf& next) {
