@@ -71,9 +71,9 @@ class Compare : public Sink {
   }
 
   void drain() override {
-    if (end_ == schema_.lattice.layers().end) {
+    if (end_ && *end_ == schema_.lattice.layers().end) {
       const ZRange others = other_->schema().lattice.layers();
-      compare({}, {std::max(end_, others.begin), others.end});
+      compare({}, {std::max(*end_, others.begin), others.end});
     }
     other_->drain();
   }
@@ -172,7 +172,7 @@ class Compare : public Sink {
   Schema schema_;
   std::unique_ptr<SlabReader> other_;
   std::map<std::string, Finding> findings_;
-  int end_ = 0;
+  std::optional<int> end_;  ///< of the layers that came
 };
 
 }  // namespace

@@ -141,7 +141,10 @@ void runChain(const std::vector<std::string>& words) {
   console.begin(options.quiet, 0, 0);
   const auto start = std::chrono::steady_clock::now();
   pipeline.plan(console);
-  if (options.explain) return printData(pipeline.explanation().c_str());
+  if (options.explain) {
+    printData(pipeline.explanation().c_str());
+    return pipeline.drain();
+  }
   console.begin(options.quiet || options.verbose, pipeline.boxVoxels(),
                 pipeline.expectedSeconds().value_or(0));
   try {

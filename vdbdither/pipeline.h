@@ -59,6 +59,9 @@ class Pipeline {
 
   /// Runs to the end and publishes. Throws DataError; nothing half-made remains.
   void run();
+  /// Reads the pipes that feed it to their end, which `run` does too: in its place where nothing is
+  /// to be made. Asked after `plan`. Throws DataError where a writer fails.
+  void drain();
 
   [[nodiscard]] std::vector<StageReport> reports() const;
   /// Whether the voxels leave by standard output.
@@ -79,7 +82,6 @@ class Pipeline {
   void push(std::size_t index, Slab slab);
   void pushEmpty(std::size_t index, int end);
   void take(std::size_t index, Slab slab);
-  void drain();
   [[nodiscard]] double expectedMemoryBytes(int slab_layers) const;
   [[nodiscard]] double memoryBudgetBytes() const;
   void planWork();

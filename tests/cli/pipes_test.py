@@ -3,6 +3,7 @@
 import os
 import random
 import signal
+import subprocess
 import time
 import unittest
 
@@ -188,6 +189,35 @@ class Stops(ProgramTest):
         process.send_signal(signal.SIGINT)
         process.communicate()
         self.assertEqual(self.listing(), before)
+
+
+class Explained(ProgramTest):
+    """Runs that only say what they would do, at the end of a pipe."""
+
+    def setUp(self):
+        super().setUp()
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
+        self.source = "vdbdither mesh2sdf part.stl --printer mimaki-3duj-553"
+
+    def test_explain_behind_a_pipe_lets_its_writer_end_well(self):
+        self.succeed("mesh2sdf", "part.stl", *MIMAKI, "-o", "part.vdb")
+        before = self.listing()
+        for reader in ("dither ! slice-export out", "dither --layers 0:8 -o x.vdb", "compare part.vdb",
+                       f"csg --union <({self.source}) -o x.vdb"):
+            with self.subTest(reader=reader):
+                self.assertIn(b"\nmemory ", self.shell(f"{self.source} | vdbdither {reader} --explain"))
+                self.assertEqual(self.listing(), before)
+
+    def test_explain_says_what_it_knows_before_its_writer_is_done(self):
+        frames = self.succeed("mesh2sdf", "part.stl", *MIMAKI)
+        process = self.start("dither", "-o", "x.vdb", "--explain", stdin=subprocess.PIPE)
+        process.stdin.write(frames[:-1])
+        process.stdin.flush()
+        self.assertTrue(process.stdout.readline().startswith(b"lattice "))
+        self.assertIsNone(process.poll())
+        said = process.communicate()[1].decode()
+        self.assertEqual(process.returncode, 1)
+        self.assertRegex(said, r"^vdbdither read: standard input .*\n$")
 
 
 if __name__ == "__main__":
