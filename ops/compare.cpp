@@ -8,6 +8,7 @@
 #include "ops/kernels/grid_difference.h"
 #include "vdbdither/comma_list.h"
 #include "vdbdither/errors.h"
+#include "vdbdither/layers.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
 
@@ -54,6 +55,14 @@ class Compare : public Sink {
   }
 
   [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
+
+  [[nodiscard]] std::optional<Work> work() const override {
+    double us = 0;
+    for (const auto& [name, finding] : findings_) {
+      if (finding.apart.empty()) us += 2 + 1e-3 * leafBytes(other_->schema().grids.at(name));
+    }
+    return Work{.us_per_leaf = us};
+  }
 
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
     std::vector<std::string> names;

@@ -83,6 +83,9 @@ class Mask : public Source {
     Schema schema;
     schema.lattice.box = openvdb::CoordBBox(Coord(0, 0, 0), size.offsetBy(-1));
     schema.grids["mask"] = emptyGrid();
+    const auto leaves = [](int voxels) { return (voxels + leaf_layers - 1) / leaf_layers; };
+    schema.leaves_per_row = leaves(size.x()) * leaves(size.y());
+    schema.leaves = schema.leaves_per_row * leaves(size.z());
     return schema;
   }
 
@@ -92,6 +95,15 @@ class Mask : public Source {
     return kind_ == "void-and-cluster" ? 8 * ranks
            : kind_ == "gradient-noise" ? 5 * ranks
                                        : 2 * ranks;
+  }
+
+  [[nodiscard]] std::optional<Work> work() const override {
+    const Coord size = tileSize();
+    const double voxels = static_cast<double>(size.x()) * size.y() * size.z();
+    if (kind_ == "void-and-cluster")
+      return Work{.seconds = voidAndClusterSeconds(settings()) + 2e-8 * voxels};
+    const double us_per_voxel = kind_ == "gradient-noise" ? 0.3 : 0.025;
+    return Work{.seconds = 1e-6 * us_per_voxel * voxels};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {

@@ -191,6 +191,17 @@ class Measure : public Sink {
 
   [[nodiscard]] bool isBarrier() const override { return true; }
 
+  [[nodiscard]] std::optional<Work> work() const override {
+    // Triangles at the surface are about as long as the diagonal of a voxel's largest face.
+    const openvdb::Vec3d& pitch = lattice_.pitch_mm;
+    const double side_mm =
+        std::sqrt(pitch.lengthSqr() - std::pow(std::min({pitch.x(), pitch.y(), pitch.z()}), 2));
+    const double cuts = side_mm > spacing_mm_ ? std::ceil(side_mm / spacing_mm_) : 0;
+    const double points = 1 + 2 * cuts * cuts;  // for a vertex
+    const double smoothing = smooth_ == "none" ? 0 : taubin_.usPerVertex();
+    return Work{.us_per_leaf = GridSurface::vertices_per_leaf * (0.3 + 1.3 * points + smoothing)};
+  }
+
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
     return std::vector<std::string>{name_};
   }

@@ -74,8 +74,9 @@ class MeshToSdf : public Source {
     const Lattice& lattice = schema.lattice;
     planParts(mesh, lattice);
     const SwallowedWalls walls = repair(mesh);
-    triangles_ = static_cast<double>(mesh.triangles.size());
+    const auto triangles = static_cast<double>(mesh.triangles.size());
     const std::vector<double> leaves = leavesOfRows(mesh, lattice);
+    triangles_per_leaf_ = triangles / leavesAtSurface(mesh, lattice);
     schema.leaves_per_row = *std::max_element(leaves.begin(), leaves.end());
     schema.leaves = std::accumulate(leaves.begin(), leaves.end(), 0.0);
     field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, walls);
@@ -90,9 +91,11 @@ class MeshToSdf : public Source {
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    const double per_leaf = 2.4 + (extras_.normals ? 8 : 0) + (extras_.closest ? 2 : 0);
+    // Every leaf looks at the triangles near its nearest ones.
+    const double per_leaf =
+        2 + 1.6 * triangles_per_leaf_ + (extras_.normals ? 8 : 0) + (extras_.closest ? 2 : 0);
     const double fields = parts_.empty() ? 1 : 2;
-    return Work{.us_per_leaf = fields * per_leaf, .seconds = 1e-6 * fields * triangles_};
+    return Work{.us_per_leaf = fields * per_leaf};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {
@@ -239,6 +242,26 @@ class MeshToSdf : public Source {
     return lattice;
   }
 
+  /// How many leaves come within `band_mm` of a triangle, of the share that it has in a surface.
+  static double leavesNear(const Mesh& mesh, const Mesh::Triangle& t, const Vec3d& leaf_mm,
+                           double band_mm) {
+    const Vec3d& a = mesh.vertices[t[0]];
+    const Vec3d area = 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
+    // The region within the band of the triangle, widened by the leaf's own extent along its
+    // normal.
+    const double across = std::abs(area.x()) * leaf_mm.x() + std::abs(area.y()) * leaf_mm.y() +
+                          std::abs(area.z()) * leaf_mm.z();
+    return (2 * band_mm * area.length() + across) / leaf_mm.product();
+  }
+
+  /// How many leaves the surface itself meets.
+  static double leavesAtSurface(const Mesh& mesh, const Lattice& lattice) {
+    double leaves = 0;
+    for (const Mesh::Triangle& t : mesh.triangles)
+      leaves += leavesNear(mesh, t, lattice.pitch_mm * double{leaf_layers}, 0);
+    return leaves;
+  }
+
   /// Every leaf that the band meets, spread by the area of the surface over the rows that it
   /// crosses.
   std::vector<double> leavesOfRows(const Mesh& mesh, const Lattice& lattice) const {
@@ -248,16 +271,9 @@ class MeshToSdf : public Source {
     std::vector<double> leaves(rows + 1, 0.0);
     const double band_mm = band_.greatestMm(lattice.pitch_mm);
     for (const Mesh::Triangle& t : mesh.triangles) {
-      const Vec3d& a = mesh.vertices[t[0]];
-      const Vec3d& b = mesh.vertices[t[1]];
-      const Vec3d& c = mesh.vertices[t[2]];
-      const Vec3d area = 0.5 * (b - a).cross(c - a);
-      // The region within the band of the triangle, widened by the leaf's own extent along its
-      // normal.
-      const double across = std::abs(area.x()) * leaf_mm.x() + std::abs(area.y()) * leaf_mm.y() +
-                            std::abs(area.z()) * leaf_mm.z();
-      const double touched = (2 * band_mm * area.length() + across) / leaf_mm.product();
-      const auto [z_low, z_high] = std::minmax({a.z(), b.z(), c.z()});
+      const double touched = leavesNear(mesh, t, leaf_mm, band_mm);
+      const auto [z_low, z_high] =
+          std::minmax({mesh.vertices[t[0]].z(), mesh.vertices[t[1]].z(), mesh.vertices[t[2]].z()});
       const auto first = static_cast<std::size_t>(
           std::clamp((z_low - band_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
       const auto last = static_cast<std::size_t>(
@@ -292,7 +308,7 @@ class MeshToSdf : public Source {
   Band band_;
   double held_band_mm_ = 0;
   std::unique_ptr<MeshDistance> field_;
-  double triangles_ = 0;
+  double triangles_per_leaf_ = 0;             ///< of those that the surface itself meets
   std::vector<std::size_t> triangle_counts_;  ///< of every file
   std::vector<MeshDistance> parts_;           ///< of every file, where there are several
 };

@@ -91,11 +91,19 @@ class Render : public Sink {
     std::vector<std::string> there;
     for (const auto& [name, grid] : in.grids) there.push_back(name);
     name_ = chosenSurfaceGrid(there, grid_);
+    lattice_ = in.lattice;
     surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
     if (blocks_) faces_.emplace(in.lattice);
   }
 
   [[nodiscard]] bool isBarrier() const override { return true; }
+
+  [[nodiscard]] std::optional<Work> work() const override {
+    const std::optional<double> pixels = drawnPixels();
+    if (!pixels) return std::nullopt;
+    return Work{.us_per_leaf = 1.4 * GridSurface::vertices_per_leaf,
+                .seconds = 1.1e-6 * *pixels * samples_};
+  }
 
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
     return std::vector<std::string>{name_};
@@ -139,6 +147,27 @@ class Render : public Sink {
  private:
   [[nodiscard]] Mesh meshOf(const std::string& file) const {
     return readMesh(file, [this](const std::string& text) { report().warn(text); });
+  }
+
+  /// About how many pixels show something; nothing where the picture may be refused.
+  [[nodiscard]] std::optional<double> drawnPixels() const {
+    const auto pixels = [](const Camera& camera) { return 1.0 * camera.width * camera.height; };
+    if (!frame_file_.empty()) return 0.55 * pixels(camera_);
+    Mesh corners;
+    for (int corner = 0; corner < 8; ++corner) {
+      openvdb::Vec3d at = lattice_.position(lattice_.box.min());
+      for (int axis = 0; axis < 3; ++axis) {
+        if ((corner >> axis & 1) != 0) at[axis] = lattice_.position(lattice_.box.max())[axis];
+      }
+      corners.vertices.push_back(at);
+    }
+    Camera camera = camera_;
+    try {
+      frame(camera, corners, 0);
+    } catch (const DataError&) {
+      return std::nullopt;
+    }
+    return 0.35 * pixels(camera);
   }
 
   void take(const SurfacePiece& piece) {
@@ -189,6 +218,7 @@ class Render : public Sink {
   bool overwrite_ = false;
 
   std::string name_;
+  Lattice lattice_;
   std::optional<GridSurface> surface_;
   std::optional<VoxelFaces> faces_;
   Mesh mesh_;

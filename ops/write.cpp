@@ -67,11 +67,16 @@ class WriteOperator : public Sink {
   [[nodiscard]] bool isBarrier() const override { return !isPipe(); }
   [[nodiscard]] OutputEstimate output() const override {
     if (isPipe()) return {};
-    // Measured on spheres and bunnies: what is active, packed. Bits are not packed.
+    // Measured on spheres and bunnies: what is active, packed. Bits are not packed, and noise
+    // cannot be, which a grid of no class may hold.
     double per_leaf = 0;
     for (const auto& [name, grid] : schema_.grids) {
       const bool bits = grid->isType<openvdb::BoolGrid>() || grid->isType<openvdb::MaskGrid>();
-      per_leaf += leafBytes(grid) * (bits ? 1.1 : half_ ? 0.14 : 0.2);
+      const bool noise =
+          grid->isType<openvdb::FloatGrid>() && grid->getGridClass() == openvdb::GRID_UNKNOWN;
+      const double packed = half_ ? 0.14 : 0.2;
+      const double unpacked = half_ ? 0.5 : 1;
+      per_leaf += leafBytes(grid) * (bits ? 1.1 : noise ? unpacked : packed);
     }
     return {path_, schema_.leaves * per_leaf};
   }

@@ -35,6 +35,9 @@ std::uint32_t initialCount(std::uint32_t count);
 /// it touches.
 double smallestWeight(const openvdb::Coord& size);
 
+/// About what voidAndCluster takes with the best instruction set, as CPU time of one thread.
+double voidAndClusterSeconds(const VoidAndCluster& settings);
+
 /// The ranks of a mask by void and cluster, x fastest: a permutation of 0 … n - 1.
 ///
 /// The voxels that randomPermutation(n, seed) puts below initialCount(n) start as set. The tightest

@@ -25,6 +25,7 @@ class Examples(ProgramTest):
                 example = help_text.split("Example:\n")[1].strip()
                 for line in example.splitlines():
                     self.assertTrue(line.strip().startswith("vdbdither "), example)
+                    self.assertRegex(self.shell(f"{line} --explain").decode(), r"(?m)^time +about \d", line)
                     self.shell(line)
                 self.assertGreater(len(self.listing()), 1, "it makes something")
 

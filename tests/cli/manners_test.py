@@ -77,11 +77,44 @@ class Manners(ProgramTest):
     def test_explain_says_what_it_does_not_know(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
         self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 -o surface.vdb")
-        self.assertRegex(self.explained("read surface.vdb ! dither ! measure --reference part.stl")["time"], "^unknown of measure$")
         piped = self.succeed("read", "surface.vdb")
         said = self.succeed("dither", "-o", "x.vdb", "--explain", input=piped).decode()
         self.assertRegex(said, r"(?m)^time +unknown of read, dither, write$")
         self.assertRegex(said, r"(?m)^disk +unknown of .* for x\.vdb$")
+
+    def seconds(self, chain):
+        """The time that --explain promises on one thread."""
+        said = self.explained(chain)["time"]
+        number, unit = re.fullmatch(r"about ([\d.]+) (s|min|h) on 1 thread", said).groups()
+        return float(number) * {"s": 1, "min": 60, "h": 3600}[unit]
+
+    def test_what_is_asked_for_costs_its_time(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
+        source = "mesh2sdf part.stl --printer mimaki-3duj-553 --threads 1"
+        for little, much, least, most in (
+                (f"{source} ! mesh-export x.stl --smooth taubin --iterations 2000", "--iterations 20000", 8, 12),
+                (f"{source} ! render x.png --samples 2000", "--samples 20000", 8, 12),
+                (f"{source} ! render x.png --samples 4000", "--frame part.stl", 0.5, 2),
+                (f"{source} ! measure --reference part.stl --spacing 0.01", "--spacing 0.001", 50, 120),
+                (f"{source} --band 100 -o x.vdb", "--band 1000", 8, 12),
+                ("mask --size 64 --threads 1 --kernel gauss -o x.vdb", "--sigma 3", 4, 20),
+                ("mask --size 96 --threads 1 -o x.vdb", "--size 192", 8, 30),
+                ("mask --size 64 --threads 1 ! mask-spectrum x.json", "--step 0.5", 2, 4)):
+            with self.subTest(much=much):
+                ratio = self.seconds(f"{little} {much}") / self.seconds(little)
+                self.assertTrue(least < ratio < most, ratio)
+
+    def test_disk_of_a_mesh_or_a_mask_is_told_within_a_factor(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(4, 60))
+        solid = "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither"
+        for chain, output in ((f"{solid} ! mesh-export x.stl", "x.stl"), (f"{solid} ! mesh-export x.ply", "x.ply"),
+                              (f"{solid} ! mesh-export x.obj --smooth taubin --iterations 1", "x.obj"),
+                              ("mask --size 32 --kind white -o x.vdb", "x.vdb")):
+            with self.subTest(chain=chain):
+                expected, unit = re.match(r"about ([\d.]+) (\w+) of", self.explained(chain)["disk"]).groups()
+                self.succeed("run", chain)
+                used = (self.folder / output).stat().st_size
+                self.assertTrue(0.5 < float(expected) * {"KiB": 2**10, "MiB": 2**20}[unit] / used < 2, (expected, unit, used))
 
     def test_json_tells_what_was_expected_beside_what_came(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
