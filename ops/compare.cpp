@@ -59,7 +59,7 @@ class Compare : public Sink {
   [[nodiscard]] std::optional<Work> work() const override {
     double us = 0;
     for (const auto& [name, finding] : findings_) {
-      if (finding.apart.empty()) us += 2 + 1e-3 * leafBytes(other_->schema().grids.at(name));
+      if (finding.apart.empty()) us += 3 + 1e-3 * leafBytes(other_->schema().grids.at(name));
     }
     return Work{.us_per_leaf = us};
   }

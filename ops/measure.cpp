@@ -199,7 +199,8 @@ class Measure : public Sink {
     const double cuts = side_mm > spacing_mm_ ? std::ceil(side_mm / spacing_mm_) : 0;
     const double points = 1 + 2 * cuts * cuts;  // for a vertex
     const double smoothing = smooth_ == "none" ? 0 : taubin_.usPerVertex();
-    return Work{.us_per_leaf = GridSurface::vertices_per_leaf * (0.3 + 1.3 * points + smoothing)};
+    return Work{.us_per_leaf = GridSurface::vertices_per_leaf * (0.3 + 1.3 * points + smoothing),
+                .seconds = 2e-6 * static_cast<double>(reference_->mesh().triangles.size())};
   }
 
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {

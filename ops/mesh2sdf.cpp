@@ -93,7 +93,7 @@ class MeshToSdf : public Source {
   [[nodiscard]] std::optional<Work> work() const override {
     // Every leaf looks at the triangles near its nearest ones.
     const double per_leaf =
-        2 + 1.6 * triangles_per_leaf_ + (extras_.normals ? 8 : 0) + (extras_.closest ? 2 : 0);
+        2 + 1.2 * triangles_per_leaf_ + (extras_.normals ? 8 : 0) + (extras_.closest ? 2 : 0);
     const double fields = parts_.empty() ? 1 : 2;
     return Work{.us_per_leaf = fields * per_leaf};
   }

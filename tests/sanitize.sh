@@ -2,8 +2,31 @@
 # Builds everything with the instruments of a sanitizer and runs the tests that suit it. What is left out is told.
 #
 #     tests/sanitize.sh [asan|tsan] [ctest arguments]      asan: AddressSanitizer and UndefinedBehaviorSanitizer
+#                                                          tsan: ThreadSanitizer
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/../cmake/setup.sh"
+
+# Builds the source of Debian's own libtbb with ThreadSanitizer into a folder, where the programs of that preset look first:
+# of the libtbb without instruments it does not see how work goes from thread to thread, and takes that for races.
+build_tbb() {
+  local folder=$1 version apt
+  version=$(dpkg-query --show --showformat='${source:Version}' libtbb-dev)
+  if [ -e "$folder/$version" ]; then return; fi
+  say "building libtbb $version in $folder"
+  rm -rf "$folder"
+  mkdir -p "$folder"/apt/{sources,lists/partial,cache/archives/partial}
+  echo "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] http://deb.debian.org/debian bookworm main" \
+    >"$folder/apt/sources/source.list"
+  apt=(-o Dir::Etc::SourceList=/dev/null -o Dir::Etc::SourceParts="$folder/apt/sources" -o Dir::State::Lists="$folder/apt/lists"
+    -o Dir::Cache="$folder/apt/cache" -o APT::Sandbox::User=)
+  quietly apt-get "${apt[@]}" update
+  (cd "$folder/apt" && quietly apt-get "${apt[@]}" source "onetbb=$version")
+  quietly cmake -S "$folder"/apt/onetbb-* -B "$folder/build" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+    -DCMAKE_C_COMPILER=clang-14 -DCMAKE_CXX_COMPILER=clang++-14 -DTBB_SANITIZE=thread -DTBB_TEST=OFF -DTBBMALLOC_BUILD=OFF
+  quietly cmake --build "$folder/build" --target tbb
+  cp -a "$folder"/build/*/libtbb.so* "$folder"
+  touch "$folder/$version"
+}
 
 preset=asan
 case ${1:-} in asan | tsan)
@@ -14,6 +37,7 @@ esac
 
 install_packages "${program_packages[@]}" "${test_packages[@]}" "${sanitize_packages[@]}"
 cd "$root"
+if [ "$preset" = tsan ]; then build_tbb "$root/build/tsan/tbb"; fi
 say "building in $root/build/$preset (minutes the first time)"
 quietly cmake --preset "$preset"
 quietly cmake --build --preset "$preset"

@@ -24,8 +24,8 @@ std::string chosenSurfaceGrid(std::span<const std::string> there, const std::str
 /// fog volume (an occupancy) the level ½.
 class GridSurface {
  public:
-  /// About how many vertices it has in a leaf that it crosses, and half as many as triangles.
-  static constexpr double vertices_per_leaf = 50;
+  /// About how many vertices it has in a leaf that it crosses; triangles are twice as many.
+  static constexpr double vertices_per_leaf = 55;
 
   /// `prototype`: a grid of the kind that is to come. `level`: another level, in the grid's own
   /// unit. Throws DataError where the grid has no surface, or not at that level.
