@@ -15,8 +15,10 @@ build_tbb() {
   say "building libtbb $version in $folder"
   rm -rf "$folder"
   mkdir -p "$folder"/apt/{sources,lists/partial,cache/archives/partial}
-  echo "deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] http://deb.debian.org/debian bookworm main" \
-    >"$folder/apt/sources/source.list"
+  # The sources of what the machine's own lists name.
+  apt-get indextargets 'Created-By: Packages' 'Release: bookworm' \
+    --format 'deb-src [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] $(SITE) $(RELEASE) $(COMPONENT)' |
+    sort --unique >"$folder/apt/sources/source.list"
   apt=(-o Dir::Etc::SourceList=/dev/null -o Dir::Etc::SourceParts="$folder/apt/sources" -o Dir::State::Lists="$folder/apt/lists"
     -o Dir::Cache="$folder/apt/cache" -o APT::Sandbox::User=)
   quietly apt-get "${apt[@]}" update
