@@ -160,7 +160,7 @@ FloatGrid::Ptr SurfaceOffset::run(const FloatGrid& surface, const FloatGrid* hei
       }
     };
     displace([&] {
-      return AtFoot{*this, LeafNormals(surface.tree(), lattice.pitch_mm, valid),
+      return AtFoot{LeafNormals(surface.tree(), lattice.pitch_mm, valid), *this,
                     std::make_shared<Heights>(*this, heights, greatest)};
     });
   } else {
