@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <openvdb/math/BBox.h>
+#include <openvdb/math/Mat3.h>
 #include <openvdb/tree/ValueAccessor.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
@@ -113,6 +114,11 @@ class Cells {
     Key corner;
     int axis;
   };
+  /// Where an edge passes the surface.
+  struct Crossing {
+    Vec3d at;
+    Vec3d normal;  ///< unit, in either direction; or zero
+  };
 
   [[nodiscard]] Vec3d position(const Coord& corner) const {
     return origin_mm_ + corner.asVec3d() * cell_mm_;
@@ -124,9 +130,11 @@ class Cells {
   [[nodiscard]] bool isInside(const Vec3d& p) const { return winding_.judgedAt(p) > 0.5; }
   void touch(std::uint32_t triangle, std::vector<Touch>& touches) const;
   [[nodiscard]] std::span<const Touch> touchesOf(Key cell) const;
-  [[nodiscard]] double crossing(const Cut& cut, bool low_is_inside) const;
+  [[nodiscard]] Crossing crossing(const Cut& cut, bool low_is_inside) const;
   [[nodiscard]] double smoothCrossing(const Vec3d& from, const Vec3d& along, double low,
                                       double high) const;
+  [[nodiscard]] Vec3d gradientAt(const Vec3d& p) const;
+  [[nodiscard]] Vec3d meet(const Coord& cell, std::span<const Crossing> crossings) const;
 
   const Mesh& mesh_;
   const WindingNumber& winding_;
@@ -304,15 +312,64 @@ double Cells::smoothCrossing(const Vec3d& from, const Vec3d& along, double low, 
   return 0.5 * (low + high);
 }
 
-/// Where along the edge the set ends, as a fraction of it.
-double Cells::crossing(const Cut& cut, bool low_is_inside) const {
-  constexpr double beside = 1e-5;  // of an edge: where a triangle's sides are looked at
+/// The direction in which the number changes, where no triangle is near.
+Vec3d Cells::gradientAt(const Vec3d& p) const {
+  Vec3d gradient;
+  for (int axis = 0; axis < 3; ++axis) {
+    Vec3d step(0.0);
+    step[axis] = 0.01 * cell_mm_;
+    gradient[axis] = winding_.closelyAt(p + step) - winding_.closelyAt(p - step);
+  }
+  const double length = gradient.length();
+  return length > 0 ? gradient / length : gradient;
+}
+
+/// Where the tangents at crossings meet: the point of least squares, where they say nothing the
+/// middle of the crossings (Ju, Losasso, Schaefer, Warren: "Dual Contouring of Hermite Data",
+/// 2002). Within the cell.
+Vec3d Cells::meet(const Coord& cell, std::span<const Crossing> crossings) const {
+  Vec3d middle(0.0);
+  for (const Crossing& crossing : crossings) middle += crossing.at;
+  middle /= static_cast<double>(crossings.size());
+  openvdb::Mat3d sum = openvdb::Mat3d::zero();
+  Vec3d pull(0.0);
+  for (const Crossing& crossing : crossings) {
+    const Vec3d& n = crossing.normal;
+    const double height = n.dot(crossing.at - middle);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) sum(i, j) += n[i] * n[j];
+    pull += n * height;
+  }
+  openvdb::Mat3d directions;
+  Vec3d strengths;
+  if (!openvdb::math::diagonalizeSymmetricMatrix(sum, directions, strengths)) return middle;
+  Vec3d at = middle;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3d direction(directions(0, i), directions(1, i), directions(2, i));
+    if (strengths[i] > 0.02) at += direction * (direction.dot(pull) / strengths[i]);
+  }
+  const Vec3d low = position(cell);
+  constexpr double least = 1.0 / 1024;
+  for (int axis = 0; axis < 3; ++axis)
+    at[axis] =
+        std::clamp(at[axis], low[axis] + least * cell_mm_, low[axis] + (1 - least) * cell_mm_);
+  return at;
+}
+
+/// Where along the edge the set ends.
+Cells::Crossing Cells::crossing(const Cut& cut, bool low_is_inside) const {
+  constexpr double beside = 1e-5;       // of an edge: where a triangle's sides are looked at
+  constexpr double least = 1.0 / 1024;  // so that no two crossings are at one place
   const Vec3d from = position(coordOf(cut.corner));
   Vec3d along(0.0);
   along[cut.axis] = cell_mm_;
   const int u = (cut.axis + 1) % 3;
   const int v = (cut.axis + 2) % 3;
-  std::vector<double> cuts;  // by triangles
+  struct Pierced {
+    double t;
+    Vec3d normal;
+  };
+  std::vector<Pierced> pierced;
   for (const Touch& touch : touchesOf(cut.corner)) {
     const std::array<Vec3d, 3> at = corners(touch.triangle);
     const Vec3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
@@ -325,26 +382,65 @@ double Cells::crossing(const Cut& cut, bool low_is_inside) const {
     }
     if (left != (normal[cut.axis] > 0 ? 3 : 0)) continue;
     const double t = normal.dot(at[0] - from) / (normal[cut.axis] * cell_mm_);
-    if (t > beside && t < 1 - beside) cuts.push_back(t);
+    if (t > beside && t < 1 - beside) pierced.push_back({t, normal});
   }
-  std::sort(cuts.begin(), cuts.end());
+  std::sort(pierced.begin(), pierced.end(),
+            [](const Pierced& a, const Pierced& b) { return a.t < b.t; });
   double low = 0;
   double high = 1;
-  auto first = cuts.begin();
-  auto last = cuts.end();
+  auto first = pierced.begin();
+  auto last = pierced.end();
   while (first != last) {
     const auto middle = first + (last - first) / 2;
-    if (isInside(from + along * (*middle - beside)) != low_is_inside) {
-      high = *middle - beside;
+    if (isInside(from + along * (middle->t - beside)) != low_is_inside) {
+      high = middle->t - beside;
       last = middle;
-    } else if (isInside(from + along * (*middle + beside)) != low_is_inside) {
-      return *middle;
+    } else if (isInside(from + along * (middle->t + beside)) != low_is_inside) {
+      return {from + along * std::clamp(middle->t, least, 1 - least),
+              middle->normal / middle->normal.length()};
     } else {
-      low = *middle + beside;
+      low = middle->t + beside;
       first = middle + 1;
     }
   }
-  return high > low ? smoothCrossing(from, along, low, high) : low;
+  const double t = high > low ? smoothCrossing(from, along, low, high) : low;
+  const Vec3d at = from + along * std::clamp(t, least, 1 - least);
+  return {at, gradientAt(at)};
+}
+
+/// The polygons of a case of marching cubes.
+struct Sheets {
+  std::array<std::int8_t, 12> of{};  ///< by edge; −1 where it is not cut
+  std::int8_t count = 0;
+};
+const std::array<Sheets, 256>& sheetsOfCases() {
+  static const std::array<Sheets, 256> all = [] {
+    std::array<Sheets, 256> made;
+    for (std::size_t inside = 0; inside < 256; ++inside) {
+      Sheets& sheets = made[inside];
+      std::array<std::uint8_t, 12> root;
+      for (std::uint8_t edge = 0; edge < 12; ++edge) root[edge] = edge;
+      const auto join = [&](std::uint8_t a, std::uint8_t b) {
+        const std::uint8_t from = root[b];
+        for (std::uint8_t& r : root)
+          if (r == from) r = root[a];
+      };
+      for (const auto& t : cubeCases()[inside].triangles) {
+        join(t[0], t[1]);
+        join(t[0], t[2]);
+      }
+      sheets.of.fill(-1);
+      for (std::size_t edge = 0; edge < 12; ++edge) {
+        if ((cubeCases()[inside].edges >> edge & 1) == 0) continue;
+        for (std::size_t before = 0; before < edge; ++before)
+          if (root[before] == root[edge] && sheets.of[before] >= 0)
+            sheets.of[edge] = sheets.of[before];
+        if (sheets.of[edge] < 0) sheets.of[edge] = sheets.count++;
+      }
+    }
+    return made;
+  }();
+  return all;
 }
 
 Mesh Cells::surface(const Stretch& stretch) const {
@@ -373,29 +469,68 @@ Mesh Cells::surface(const Stretch& stretch) const {
   }
   sortUnique(edges);
 
-  Mesh mesh;
-  mesh.vertices.resize(edges.size());
+  const auto place = [&](Key edge) {
+    return static_cast<std::size_t>(std::lower_bound(edges.begin(), edges.end(), edge) -
+                                    edges.begin());
+  };
+  std::vector<Crossing> crossings(edges.size());
   forAll(edges.size(), stretch, [&](std::size_t i) {
     const Cut cut{edges[i] / 3, static_cast<int>(edges[i] % 3)};
-    const Coord corner = coordOf(cut.corner);
-    // So that no two vertices are at one place.
-    constexpr double least = 1.0 / 1024;
-    mesh.vertices[i] = position(corner);
-    mesh.vertices[i][cut.axis] +=
-        cell_mm_ * std::clamp(crossing(cut, corners_.getValue(corner)), least, 1 - least);
+    crossings[i] = crossing(cut, corners_.getValue(coordOf(cut.corner)));
   });
-  for (const Mixed& cell : mixed) {
-    const CubeCase& made = cubeCases()[static_cast<std::size_t>(cell.inside)];
-    std::array<std::uint32_t, 12> vertex{};
-    for (int edge = 0; edge < 12; ++edge) {
-      if ((made.edges >> edge & 1) == 0) continue;
-      const auto found =
-          std::lower_bound(edges.begin(), edges.end(), edgeOf(coordOf(cell.cell), edge));
-      vertex[static_cast<std::size_t>(edge)] = static_cast<std::uint32_t>(found - edges.begin());
+  std::vector<std::uint32_t> first_vertex(mixed.size() + 1);  // of a cell
+  first_vertex[0] = static_cast<std::uint32_t>(edges.size());
+  for (std::size_t i = 0; i < mixed.size(); ++i)
+    first_vertex[i + 1] =
+        first_vertex[i] + static_cast<std::uint32_t>(
+                              sheetsOfCases()[static_cast<std::size_t>(mixed[i].inside)].count);
+  Mesh mesh;
+  mesh.vertices.resize(first_vertex.back());
+  for (std::size_t i = 0; i < edges.size(); ++i) mesh.vertices[i] = crossings[i].at;
+  tbb::parallel_for(std::size_t{0}, mixed.size(), [&](std::size_t i) {
+    const Coord cell = coordOf(mixed[i].cell);
+    const Sheets& sheets = sheetsOfCases()[static_cast<std::size_t>(mixed[i].inside)];
+    for (int sheet = 0; sheet < sheets.count; ++sheet) {
+      std::array<Crossing, 12> own;
+      std::size_t count = 0;
+      for (int edge = 0; edge < 12; ++edge)
+        if (sheets.of[static_cast<std::size_t>(edge)] == sheet)
+          own[count++] = crossings[place(edgeOf(cell, edge))];
+      mesh.vertices[first_vertex[i] + static_cast<std::uint32_t>(sheet)] =
+          meet(cell, {own.data(), count});
     }
-    for (const auto& t : made.triangles)
-      mesh.triangles.push_back({vertex[t[0]], vertex[t[1]], vertex[t[2]]});
-  }
+  });
+  mesh.triangles.resize(4 * edges.size());
+  tbb::parallel_for(std::size_t{0}, edges.size(), [&](std::size_t i) {
+    const auto axis = static_cast<int>(edges[i] % 3);
+    const Coord corner = coordOf(edges[i] / 3);
+    const int u = (axis + 1) % 3;
+    const int v = (axis + 2) % 3;
+    // Around the edge, counter-clockwise seen from its upper end.
+    std::array<std::uint32_t, 4> around;
+    for (std::size_t turn = 0; turn < 4; ++turn) {
+      const bool at_u = turn == 1 || turn == 2;
+      const bool at_v = turn == 2 || turn == 3;
+      Coord cell = corner;
+      cell[u] -= at_u;
+      cell[v] -= at_v;
+      const Key key = keyOf(cell);
+      const auto found = std::lower_bound(mixed.begin(), mixed.end(), key,
+                                          [](const Mixed& m, Key k) { return m.cell < k; });
+      // Edges are numbered by the lower of the other axes first.
+      const bool low_at = axis == 1 ? at_v : axis == 0 ? at_u : at_u;
+      const bool high_at = axis == 1 ? at_u : at_v;
+      const int edge = axis == 2 ? 8 + at_u + 2 * at_v : 4 * axis + low_at + 2 * high_at;
+      const auto sheet = sheetsOfCases()[static_cast<std::size_t>(found->inside)]
+                             .of[static_cast<std::size_t>(edge)];
+      around[turn] = first_vertex[static_cast<std::size_t>(found - mixed.begin())] +
+                     static_cast<std::uint32_t>(sheet);
+    }
+    if (!corners_.getValue(corner)) std::swap(around[1], around[3]);
+    for (std::size_t turn = 0; turn < 4; ++turn)
+      mesh.triangles[4 * i + turn] = {static_cast<std::uint32_t>(i), around[turn],
+                                      around[(turn + 1) % 4]};
+  });
   return mesh;
 }
 
