@@ -1,22 +1,27 @@
 // Away from the triangles the number is harmonic, and like the field of dipoles it has no flux
 // through a surface around any of them. So no piece of the surface at ½ is clear of all triangles:
 // it could neither rise nor fall across the piece. From the cells that triangles pass, growing
-// through the faces of cells with corners on both sides finds all of it, and the cost follows the
-// surface.
+// across edges whose ends are on both sides finds all of it, and the cost follows the surface.
+//
+// Cells are cut in eight where one vertex does not tell what the surface does in them: an octree of
+// leaves of any size beside each other, whose dual is closed whatever their sizes (Ju, Losasso,
+// Schaefer, Warren: "Dual Contouring of Hermite Data", 2002).
 
 #include "ops/kernels/winding_surface.h"
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <span>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include <openvdb/math/BBox.h>
 #include <openvdb/math/Mat3.h>
-#include <openvdb/tree/ValueAccessor.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
@@ -32,16 +37,20 @@ using openvdb::Vec3d;
 namespace {
 
 using Bounds = openvdb::math::BBox<Vec3d>;
-/// A cell, by its lowest corner, or a corner; in the order of z, y, x.
+/// A place in units, in the order of z, y, x; with what an edge or a leaf has besides.
 using Key = std::uint64_t;
 
-constexpr int key_bits = 20;
+constexpr int key_bits = 19;
 constexpr int key_offset = 1 << (key_bits - 1);
+constexpr std::uint32_t none = ~std::uint32_t{0};
 
-/// Along the longest side, where orientation and size are judged.
+/// Undivided cells along the longest side.
 constexpr double coarse_cells = 64;
-/// So many along the longest side fit into keys, with all around it.
-constexpr double most_cells_along = 200'000;
+/// How often a cell is cut in eight; the smallest have an edge of one unit.
+constexpr int most_cuts = 5;
+constexpr int coarse_units = 1 << most_cuts;
+/// What a vertex may miss the tangents at the crossings of its cell by, of the longest side.
+constexpr double tolerance = 1e-4;
 
 Key keyOf(const Coord& ijk) {
   const auto part = [](int index) { return static_cast<Key>(index + key_offset); };
@@ -54,9 +63,15 @@ Coord coordOf(Key key) {
   return {part(key), part(key >> key_bits), part(key >> 2 * key_bits)};
 }
 
-Coord cornerOf(const Coord& cell, int corner) {
-  return cell.offsetBy(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
-}
+struct Scattered {
+  std::size_t operator()(Key key) const {
+    key *= 0x9e3779b97f4a7c15ULL;
+    return key ^ key >> 32;
+  }
+};
+/// Never walked through, for its order says nothing.
+template <class T>
+using Map = std::unordered_map<Key, T, Scattered>;
 
 template <class T>
 void sortUnique(std::vector<T>& values) {
@@ -93,200 +108,373 @@ void forAll(std::size_t count, const Stretch& stretch, const Work& work) {
   }
 }
 
-/// The set and its surface on cells of one size.
-class Cells {
- public:
-  Cells(const Mesh& triangles, const WindingNumber& winding, const Bounds& bounds, double cell_mm);
+/// Whether a triangle meets a cube, or nearly: no axis parts them, of the cube's, along the normal,
+/// or across a side in one of the planes between the cube's.
+bool meets(const std::array<Vec3d, 3>& triangle, const Vec3d& middle, double half) {
+  half *= 1 + 1e-6;
+  const std::array<Vec3d, 3> at{triangle[0] - middle, triangle[1] - middle, triangle[2] - middle};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [low, high] = std::minmax({at[0][axis], at[1][axis], at[2][axis]});
+    if (low > half || high < -half) return false;
+  }
+  const Vec3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
+  if (std::abs(normal.dot(at[0])) >
+      half * (std::abs(normal.x()) + std::abs(normal.y()) + std::abs(normal.z())))
+    return false;
+  for (std::size_t side = 0; side < 3; ++side) {
+    const Vec3d along = at[(side + 1) % 3] - at[side];
+    for (int axis = 0; axis < 3; ++axis) {
+      const int u = (axis + 1) % 3;
+      const int v = (axis + 2) % 3;
+      const double one = along[u] * at[side][v] - along[v] * at[side][u];
+      const Vec3d& opposite = at[(side + 2) % 3];
+      const double other = along[u] * opposite[v] - along[v] * opposite[u];
+      const double reach = half * (std::abs(along[u]) + std::abs(along[v]));
+      if (std::min(one, other) > reach || std::max(one, other) < -reach) return false;
+    }
+  }
+  return true;
+}
 
-  /// Finds the cells that triangles or the surface pass.
-  void find(const Stretch& stretch);
-  [[nodiscard]] std::size_t count() const { return cells_.size(); }
-  [[nodiscard]] Mesh surface(const Stretch& stretch) const;
+/// The set and its surface.
+class Octree {
+ public:
+  Octree(const Mesh& triangles, const WindingNumber& winding, const Bounds& bounds, double unit_mm,
+         int most_cuts_here, std::size_t most_leaves);
+
+  /// Finds the leaves that triangles or the surface pass.
+  void grow(const Stretch& stretch);
+  [[nodiscard]] Mesh surface() const;
+  /// The edge of the smallest leaf.
+  [[nodiscard]] double leastMm() const { return least_ * unit_mm_; }
 
  private:
-  struct Touch {
-    Key cell;
-    std::uint32_t triangle;
-
-    friend auto operator<=>(const Touch&, const Touch&) = default;
+  struct Leaf {
+    Coord low;
+    int size;  ///< in units
+    bool divided = false;
+    std::uint32_t first = 0, count = 0;  ///< the triangles that meet it, in touches_
   };
-  struct Cut {
-    Key corner;
+  /// Of an edge between corners, or a part of one, which no other ends within.
+  struct Edge {
+    Coord low;
     int axis;
+    int size;
   };
   /// Where an edge passes the surface.
   struct Crossing {
-    Vec3d at;
-    Vec3d normal;  ///< unit, in either direction; or zero
+    Vec3d at{0.0};
+    Vec3d normal{0.0};  ///< unit, in either direction; or zero
+    int passes = 0;     ///< 2 for more
   };
 
   [[nodiscard]] Vec3d position(const Coord& corner) const {
-    return origin_mm_ + corner.asVec3d() * cell_mm_;
+    return origin_mm_ + corner.asVec3d() * unit_mm_;
   }
   [[nodiscard]] std::array<Vec3d, 3> corners(std::uint32_t triangle) const {
     const Mesh::Triangle& t = mesh_.triangles[triangle];
     return {mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]};
   }
+  [[nodiscard]] std::span<const std::uint32_t> touchesOf(const Leaf& leaf) const {
+    return {touches_.data() + leaf.first, leaf.count};
+  }
+  static Key leafKey(const Coord& low, int size) {
+    return keyOf(low) << 3 | static_cast<Key>(std::countr_zero(static_cast<unsigned>(size)));
+  }
+  static Key edgeKey(const Edge& edge) {
+    return (keyOf(edge.low) << 3 |
+            static_cast<Key>(std::countr_zero(static_cast<unsigned>(edge.size))))
+               << 2 |
+           static_cast<Key>(edge.axis);
+  }
+  static Edge edgeOf(const Leaf& leaf, int edge);
+  static Edge edgeOf(Key key) {
+    return {coordOf(key >> 5), static_cast<int>(key & 3), 1 << (key >> 2 & 7)};
+  }
+  static Coord cornerOf(const Leaf& leaf, int corner) {
+    return leaf.low.offsetBy((corner & 1) * leaf.size, (corner >> 1 & 1) * leaf.size,
+                             (corner >> 2 & 1) * leaf.size);
+  }
+
   [[nodiscard]] bool isInside(const Vec3d& p) const { return winding_.judgedAt(p) > 0.5; }
-  void touch(std::uint32_t triangle, std::vector<Touch>& touches) const;
-  [[nodiscard]] std::span<const Touch> touchesOf(Key cell) const;
-  [[nodiscard]] Crossing crossing(const Cut& cut, bool low_is_inside) const;
+  [[nodiscard]] bool isInside(const Coord& corner) const {
+    const auto found = inside_.find(keyOf(corner));
+    return found != inside_.end() && found->second;
+  }
+  [[nodiscard]] bool isCut(const Edge& edge) const {
+    Coord high = edge.low;
+    high[edge.axis] += edge.size;
+    return isInside(edge.low) != isInside(high);
+  }
+  [[nodiscard]] int insideOf(const Leaf& leaf) const {
+    int inside = 0;
+    for (int corner = 0; corner < 8; ++corner)
+      if (isInside(cornerOf(leaf, corner))) inside |= 1 << corner;
+    return inside;
+  }
+
+  void addTouched();
+  std::uint32_t add(const Coord& low, int size);
+  void divide(std::uint32_t leaf, std::vector<std::uint32_t>& fresh);
+  [[nodiscard]] std::uint32_t leafAt(const Coord& unit) const;
+  [[nodiscard]] static Coord beside(const Edge& edge, int turn);
+  [[nodiscard]] bool tellsTooLittle(const Leaf& leaf) const;
+  [[nodiscard]] Crossing crossing(const Edge& edge, const Leaf& leaf) const;
   [[nodiscard]] double smoothCrossing(const Vec3d& from, const Vec3d& along, double low,
                                       double high) const;
-  [[nodiscard]] Vec3d gradientAt(const Vec3d& p) const;
-  [[nodiscard]] Vec3d meet(const Coord& cell, std::span<const Crossing> crossings) const;
+  [[nodiscard]] Vec3d gradientAt(const Vec3d& p, double step_mm) const;
+  [[nodiscard]] Vec3d meet(const Leaf& leaf, std::span<const Crossing> crossings) const;
 
   const Mesh& mesh_;
   const WindingNumber& winding_;
-  double cell_mm_;
+  double unit_mm_;
+  int smallest_;  ///< that leaves may become
+  std::size_t most_leaves_;
+  double tolerance_mm_;
   Vec3d origin_mm_;
-  openvdb::CoordBBox limits_;         ///< of corners that may be inside
-  std::vector<Touch> touches_;        ///< sorted
-  openvdb::BoolTree corners_{false};  ///< inside, and active where that is known
-  std::vector<Key> cells_;
+  openvdb::CoordBBox limits_;  ///< of corners that may be inside
+  std::vector<Leaf> leaves_;
+  Map<std::uint32_t> leaf_at_;
+  std::vector<std::uint32_t> touches_;
+  Map<bool> inside_;         ///< by corner
+  Map<Crossing> crossings_;  ///< by edge, of those that are cut or pierced
+  int least_ = coarse_units;
 };
 
-Cells::Cells(const Mesh& triangles, const WindingNumber& winding, const Bounds& bounds,
-             double cell_mm)
-    : mesh_(triangles), winding_(winding), cell_mm_(cell_mm) {
+Octree::Octree(const Mesh& triangles, const WindingNumber& winding, const Bounds& bounds,
+               double unit_mm, int most_cuts_here, std::size_t most_leaves)
+    : mesh_(triangles),
+      winding_(winding),
+      unit_mm_(unit_mm),
+      smallest_(coarse_units >> most_cuts_here),
+      most_leaves_(most_leaves),
+      tolerance_mm_(tolerance * bounds.extents()[static_cast<int>(bounds.maxExtent())]) {
   // A part of a cell that keeps corners out of planes which designers like.
-  origin_mm_ = bounds.min() - cell_mm * Vec3d(0.3819, 0.4142, 0.3028);
+  origin_mm_ = bounds.min() - coarse_units * unit_mm * Vec3d(0.3819, 0.4142, 0.3028);
   const double around_mm = 0.5 * bounds.extents()[static_cast<int>(bounds.maxExtent())];
-  limits_ = {Coord::floor((bounds.min() - around_mm - origin_mm_) / cell_mm),
-             Coord::ceil((bounds.max() + around_mm - origin_mm_) / cell_mm)};
+  limits_ = {Coord::floor((bounds.min() - around_mm - origin_mm_) / unit_mm),
+             Coord::ceil((bounds.max() + around_mm - origin_mm_) / unit_mm)};
 }
 
-/// Notes the cells that a triangle passes: of the columns of cells across the axis that it faces
-/// most those that it meets, and in each what the slope of its plane leaves.
-void Cells::touch(std::uint32_t triangle, std::vector<Touch>& touches) const {
-  constexpr double widening = 1e-6;  // of a cell, for rounding
-  std::array<Vec3d, 3> at = corners(triangle);
-  for (Vec3d& corner : at) corner = (corner - origin_mm_) / cell_mm_;
-  const Vec3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
-  const auto w = static_cast<int>(openvdb::math::MaxIndex(
-      Vec3d(std::abs(normal.x()), std::abs(normal.y()), std::abs(normal.z()))));
-  if (normal[w] == 0) return;  // without area
-  const int u = (w + 1) % 3;
-  const int v = (w + 2) % 3;
-  Bounds box;
-  for (const Vec3d& corner : at) box.expand(corner);
-  box.expand(widening);
-  const double turn = normal[w] > 0 ? 1 : -1;
-  const double slope_u = -normal[u] / normal[w];
-  const double slope_v = -normal[v] / normal[w];
-  const double rise = 0.5 * (std::abs(slope_u) + std::abs(slope_v)) + widening;
-  for (int i = static_cast<int>(std::floor(box.min()[u])); i <= box.max()[u]; ++i) {
-    for (int j = static_cast<int>(std::floor(box.min()[v])); j <= box.max()[v]; ++j) {
-      const double middle_u = i + 0.5;
-      const double middle_v = j + 0.5;
-      bool outside = false;
-      for (std::size_t side = 0; side < 3 && !outside; ++side) {
-        const Vec3d& a = at[side];
-        const Vec3d& b = at[(side + 1) % 3];
-        const double along_u = turn * (b[u] - a[u]);
-        const double along_v = turn * (b[v] - a[v]);
-        const double reach = (0.5 + widening) * (std::abs(along_u) + std::abs(along_v));
-        outside = along_u * (middle_v - a[v]) - along_v * (middle_u - a[u]) < -reach;
-      }
-      if (outside) continue;
-      const double height =
-          at[0][w] + slope_u * (middle_u - at[0][u]) + slope_v * (middle_v - at[0][v]);
-      const double low = std::max(height - rise, box.min()[w]);
-      const double high = std::min(height + rise, box.max()[w]);
-      Coord cell;
-      cell[u] = i;
-      cell[v] = j;
-      for (int k = static_cast<int>(std::floor(low)); k <= high; ++k) {
-        cell[w] = k;
-        touches.push_back({keyOf(cell), triangle});
-      }
+/// Edges are numbered as in marching_cubes.h.
+Octree::Edge Octree::edgeOf(const Leaf& leaf, int edge) {
+  Edge made{leaf.low, edge / 4, leaf.size};
+  made.low[made.axis == 0 ? 1 : 0] += (edge & 1) * leaf.size;
+  made.low[made.axis == 2 ? 1 : 2] += (edge >> 1 & 1) * leaf.size;
+  return made;
+}
+
+std::uint32_t Octree::add(const Coord& low, int size) {
+  const auto [place, is_new] =
+      leaf_at_.try_emplace(leafKey(low, size), static_cast<std::uint32_t>(leaves_.size()));
+  if (is_new) leaves_.push_back({low, size});
+  return place->second;
+}
+
+/// Adds the undivided cells that triangles meet: of the columns across the axis that a triangle
+/// faces most those that its box meets, and in each what the slope of its plane leaves.
+void Octree::addTouched() {
+  struct Touch {
+    Key cell;
+    std::uint32_t triangle;
+
+    bool operator<(const Touch& other) const {
+      return std::pair(cell, triangle) < std::pair(other.cell, other.triangle);
     }
-  }
-}
-
-std::span<const Cells::Touch> Cells::touchesOf(Key cell) const {
-  const auto first = std::lower_bound(touches_.begin(), touches_.end(), Touch{cell, 0});
-  const auto last =
-      std::find_if(first, touches_.end(), [&](const Touch& touch) { return touch.cell != cell; });
-  return {touches_.data() + (first - touches_.begin()), static_cast<std::size_t>(last - first)};
-}
-
-/// By corner, a bit each.
-template <class Accessor>
-int insideOf(const Coord& cell, const Accessor& corners) {
-  int inside = 0;
-  for (int corner = 0; corner < 8; ++corner)
-    if (corners.getValue(cornerOf(cell, corner))) inside |= 1 << corner;
-  return inside;
-}
-
-void Cells::find(const Stretch& stretch) {
+  };
   constexpr std::uint32_t in_a_block = 256;
+  const double cell_mm = coarse_units * unit_mm_;
   const auto count = static_cast<std::uint32_t>(mesh_.triangles.size());
   std::vector<std::vector<Touch>> blocks((count + in_a_block - 1) / in_a_block);
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
     const auto begin = static_cast<std::uint32_t>(block * in_a_block);
-    for (std::uint32_t t = begin; t < std::min(count, begin + in_a_block); ++t)
-      touch(t, blocks[block]);
+    for (std::uint32_t t = begin; t < std::min(count, begin + in_a_block); ++t) {
+      const std::array<Vec3d, 3> at = corners(t);
+      const Vec3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
+      int w = 0;
+      for (int axis = 1; axis < 3; ++axis)
+        if (std::abs(normal[axis]) > std::abs(normal[w])) w = axis;
+      if (normal[w] == 0) continue;  // without area
+      const int u = (w + 1) % 3;
+      const int v = (w + 2) % 3;
+      Vec3d low = at[0];
+      Vec3d high = at[0];
+      for (const Vec3d& corner : at) {
+        low = openvdb::math::minComponent(low, corner);
+        high = openvdb::math::maxComponent(high, corner);
+      }
+      constexpr double rounding = 1e-6;
+      const Vec3d first = (low - origin_mm_) / cell_mm - rounding;
+      const Vec3d last = (high - origin_mm_) / cell_mm + rounding;
+      const double rise =
+          0.5 * (std::abs(normal[u]) + std::abs(normal[v])) / std::abs(normal[w]) + rounding;
+      Coord cell;
+      for (cell[u] = static_cast<int>(std::floor(first[u])); cell[u] <= last[u]; ++cell[u])
+        for (cell[v] = static_cast<int>(std::floor(first[v])); cell[v] <= last[v]; ++cell[v]) {
+          const Vec3d from = (at[0] - origin_mm_) / cell_mm;
+          const double height = from[w] - (normal[u] * (cell[u] + 0.5 - from[u]) +
+                                           normal[v] * (cell[v] + 0.5 - from[v])) /
+                                              normal[w];
+          const double top = std::min(height + rise, last[w]);
+          for (cell[w] = static_cast<int>(std::floor(std::max(height - rise, first[w])));
+               cell[w] <= top; ++cell[w])
+            if (meets(at, origin_mm_ + (cell.asVec3d() + 0.5) * cell_mm, 0.5 * cell_mm))
+              blocks[block].push_back({keyOf(cell), t});
+        }
+    }
   });
-  for (std::vector<Touch>& block : blocks) {
-    touches_.insert(touches_.end(), block.begin(), block.end());
-    block = {};
+  std::vector<Touch> all;
+  for (const std::vector<Touch>& block : blocks) all.insert(all.end(), block.begin(), block.end());
+  tbb::parallel_sort(all.begin(), all.end());
+  touches_.reserve(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (i == 0 || all[i].cell != all[i - 1].cell) {
+      const Coord cell = coordOf(all[i].cell);
+      add(Coord(cell.x() * coarse_units, cell.y() * coarse_units, cell.z() * coarse_units),
+          coarse_units);
+      leaves_.back().first = static_cast<std::uint32_t>(i);
+    }
+    ++leaves_.back().count;
+    touches_.push_back(all[i].triangle);
   }
-  tbb::parallel_sort(touches_.begin(), touches_.end());
+}
 
-  openvdb::MaskTree reached;
-  openvdb::tree::ValueAccessor<openvdb::MaskTree, false> reached_at(reached);
-  openvdb::tree::ValueAccessor<openvdb::BoolTree, false> corners_at(corners_);
-  std::vector<Key> front;
-  for (const Touch& touch : touches_)
-    if (front.empty() || front.back() != touch.cell) front.push_back(touch.cell);
-  for (const Key cell : front) reached_at.setValueOn(coordOf(cell));
-  const auto touched = static_cast<double>(front.size());
+void Octree::divide(std::uint32_t leaf, std::vector<std::uint32_t>& fresh) {
+  const Leaf whole = leaves_[leaf];
+  leaves_[leaf].divided = true;
+  const int size = whole.size / 2;
+  least_ = std::min(least_, size);
+  for (int part = 0; part < 8; ++part) {
+    const Coord low =
+        whole.low.offsetBy((part & 1) * size, (part >> 1 & 1) * size, (part >> 2 & 1) * size);
+    const std::uint32_t made = add(low, size);
+    leaves_[made].first = static_cast<std::uint32_t>(touches_.size());
+    const double half = 0.5 * size * unit_mm_;
+    for (std::uint32_t i = whole.first; i < whole.first + whole.count; ++i) {
+      const std::uint32_t triangle = touches_[i];
+      if (meets(corners(triangle), position(low) + half, half)) touches_.push_back(triangle);
+    }
+    leaves_[made].count = static_cast<std::uint32_t>(touches_.size()) - leaves_[made].first;
+    fresh.push_back(made);
+  }
+}
+
+/// The leaf that holds a unit, or none.
+std::uint32_t Octree::leafAt(const Coord& unit) const {
+  for (int size = coarse_units; size >= least_; size /= 2) {
+    const auto found = leaf_at_.find(leafKey(unit & ~(size - 1), size));
+    if (found == leaf_at_.end()) return none;
+    if (!leaves_[found->second].divided) return found->second;
+  }
+  return none;
+}
+
+/// A unit at the edge, on each of its four sides, counter-clockwise seen from its upper end.
+Coord Octree::beside(const Edge& edge, int turn) {
+  Coord unit = edge.low;
+  if (turn == 1 || turn == 2) --unit[(edge.axis + 1) % 3];
+  if (turn == 2 || turn == 3) --unit[(edge.axis + 2) % 3];
+  return unit;
+}
+
+void Octree::grow(const Stretch& stretch) {
+  addTouched();
+  std::vector<std::uint32_t> fresh(leaves_.size());
+  std::iota(fresh.begin(), fresh.end(), 0U);
   std::vector<Key> asked;
   std::vector<char> inside;
-  while (!front.empty()) {
+  std::vector<std::pair<Key, std::uint32_t>> edges;
+  std::vector<Crossing> crossings;
+  bool may_divide = true;
+  double done = 0;
+  while (!fresh.empty()) {
+    // How much is still to come nobody knows.
+    const double next = done + 0.25 * (1 - done);
     asked.clear();
-    for (const Key cell : front)
+    for (const std::uint32_t leaf : fresh)
       for (int corner = 0; corner < 8; ++corner) {
-        const Coord at = cornerOf(coordOf(cell), corner);
-        if (!corners_at.isValueOn(at) && limits_.isInside(at)) asked.push_back(keyOf(at));
+        const Coord at = cornerOf(leaves_[leaf], corner);
+        if (limits_.isInside(at) && !inside_.contains(keyOf(at))) asked.push_back(keyOf(at));
       }
     sortUnique(asked);
     inside.assign(asked.size(), 0);
-    // How far the surface grows is not known before.
-    const double done = cells_.empty() ? 0 : 1 - 0.5 * touched / static_cast<double>(cells_.size());
-    const double next = cells_.empty() ? 0.5 : done;
-    forAll(asked.size(), stretch.part(done, next),
+    forAll(asked.size(), stretch.part(done, 0.5 * (done + next)),
            [&](std::size_t i) { inside[i] = isInside(position(coordOf(asked[i]))) ? 1 : 0; });
-    for (std::size_t i = 0; i < asked.size(); ++i)
-      corners_at.setValueOn(coordOf(asked[i]), inside[i] != 0);
-    cells_.insert(cells_.end(), front.begin(), front.end());
-    std::vector<Key> grown;
-    for (const Key key : front) {
-      const Coord cell = coordOf(key);
-      const int corners = insideOf(cell, corners_at);
-      for (int axis = 0; axis < 3; ++axis) {
-        constexpr std::array<int, 3> low_faces{0x55, 0x33, 0x0f};
-        for (int side = 0; side < 2; ++side) {
-          const int face = low_faces[static_cast<std::size_t>(axis)] << (side << axis);
-          if ((corners & face) == 0 || (corners & face) == face) continue;
-          Coord beyond = cell;
-          beyond[axis] += 2 * side - 1;
-          if (reached_at.isValueOn(beyond)) continue;
-          reached_at.setValueOn(beyond);
-          grown.push_back(keyOf(beyond));
+    for (std::size_t i = 0; i < asked.size(); ++i) inside_[asked[i]] = inside[i] != 0;
+
+    edges.clear();
+    for (const std::uint32_t leaf : fresh)
+      for (int e = 0; e < 12; ++e) {
+        const Edge edge = edgeOf(leaves_[leaf], e);
+        const Key key = edgeKey(edge);
+        if ((leaves_[leaf].count > 0 || isCut(edge)) && !crossings_.contains(key))
+          edges.emplace_back(key, leaf);
+      }
+    tbb::parallel_sort(edges.begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end(),
+                            [](const auto& a, const auto& b) { return a.first == b.first; }),
+                edges.end());
+    crossings.assign(edges.size(), {});
+    forAll(edges.size(), stretch.part(0.5 * (done + next), next), [&](std::size_t i) {
+      crossings[i] = crossing(edgeOf(edges[i].first), leaves_[edges[i].second]);
+    });
+    for (std::size_t i = 0; i < edges.size(); ++i)
+      if (crossings[i].passes > 0) crossings_[edges[i].first] = crossings[i];
+    done = next;
+
+    std::vector<char> divided(fresh.size(), 0);
+    if (may_divide)
+      tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
+        const Leaf& leaf = leaves_[fresh[i]];
+        divided[i] = leaf.size > smallest_ && tellsTooLittle(leaf) ? 1 : 0;
+      });
+    const auto dividing = static_cast<std::size_t>(std::count(divided.begin(), divided.end(), 1));
+    may_divide &= leaves_.size() + 8 * dividing <= most_leaves_;
+    std::vector<std::uint32_t> grown;
+    for (std::size_t i = 0; i < fresh.size(); ++i) {
+      const Leaf leaf = leaves_[fresh[i]];
+      for (int e = 0; e < 12; ++e) {
+        const Edge edge = edgeOf(leaf, e);
+        if (!isCut(edge)) continue;
+        for (int turn = 0; turn < 4; ++turn) {
+          const std::size_t before = leaves_.size();
+          const Coord low = beside(edge, turn) & ~(coarse_units - 1);
+          const std::uint32_t made = add(low, coarse_units);
+          if (leaves_.size() > before) grown.push_back(made);
         }
       }
+      if (may_divide && divided[i] != 0) divide(fresh[i], grown);
     }
-    front = std::move(grown);
+    fresh = std::move(grown);
   }
-  tbb::parallel_sort(cells_.begin(), cells_.end());
+}
+
+/// Whether one vertex does not tell what the surface does in the leaf.
+bool Octree::tellsTooLittle(const Leaf& leaf) const {
+  const auto inside = static_cast<std::size_t>(insideOf(leaf));
+  std::array<Crossing, 12> own;
+  std::size_t count = 0;
+  for (int e = 0; e < 12; ++e) {
+    const auto found = crossings_.find(edgeKey(edgeOf(leaf, e)));
+    if (found == crossings_.end()) continue;
+    if (found->second.passes > 1) return true;
+    own[count++] = found->second;
+  }
+  if (count == 0) return false;
+  // One polygon of n sides has n − 2 triangles.
+  const CubeCase& made = cubeCases()[inside];
+  if (made.triangles.size() + 2 != count) return true;
+  const std::span<const Crossing> crossings(own.data(), count);
+  const Vec3d at = meet(leaf, crossings);
+  return std::any_of(crossings.begin(), crossings.end(), [&](const Crossing& crossing) {
+    return std::abs(crossing.normal.dot(at - crossing.at)) > tolerance_mm_;
+  });
 }
 
 /// Where the number passes ½ on a stretch that no triangle cuts: regula falsi, held in by halving
 /// the weight of the end that stays (Illinois).
-double Cells::smoothCrossing(const Vec3d& from, const Vec3d& along, double low, double high) const {
+double Octree::smoothCrossing(const Vec3d& from, const Vec3d& along, double low,
+                              double high) const {
   const auto above = [&](double t) { return winding_.closelyAt(from + along * t) - 0.5; };
   double at_low = above(low);
   double at_high = above(high);
@@ -313,11 +501,11 @@ double Cells::smoothCrossing(const Vec3d& from, const Vec3d& along, double low, 
 }
 
 /// The direction in which the number changes, where no triangle is near.
-Vec3d Cells::gradientAt(const Vec3d& p) const {
+Vec3d Octree::gradientAt(const Vec3d& p, double step_mm) const {
   Vec3d gradient;
   for (int axis = 0; axis < 3; ++axis) {
     Vec3d step(0.0);
-    step[axis] = 0.01 * cell_mm_;
+    step[axis] = step_mm;
     gradient[axis] = winding_.closelyAt(p + step) - winding_.closelyAt(p - step);
   }
   const double length = gradient.length();
@@ -325,9 +513,8 @@ Vec3d Cells::gradientAt(const Vec3d& p) const {
 }
 
 /// Where the tangents at crossings meet: the point of least squares, where they say nothing the
-/// middle of the crossings (Ju, Losasso, Schaefer, Warren: "Dual Contouring of Hermite Data",
-/// 2002). Within the cell.
-Vec3d Cells::meet(const Coord& cell, std::span<const Crossing> crossings) const {
+/// middle of the crossings . Within the leaf.
+Vec3d Octree::meet(const Leaf& leaf, std::span<const Crossing> crossings) const {
   Vec3d middle(0.0);
   for (const Crossing& crossing : crossings) middle += crossing.at;
   middle /= static_cast<double>(crossings.size());
@@ -348,189 +535,134 @@ Vec3d Cells::meet(const Coord& cell, std::span<const Crossing> crossings) const 
     const Vec3d direction(directions(0, i), directions(1, i), directions(2, i));
     if (strengths[i] > 0.02) at += direction * (direction.dot(pull) / strengths[i]);
   }
-  const Vec3d low = position(cell);
+  const Vec3d low = position(leaf.low);
+  const double size_mm = leaf.size * unit_mm_;
   constexpr double least = 1.0 / 1024;
   for (int axis = 0; axis < 3; ++axis)
-    at[axis] =
-        std::clamp(at[axis], low[axis] + least * cell_mm_, low[axis] + (1 - least) * cell_mm_);
+    at[axis] = std::clamp(at[axis], low[axis] + least * size_mm, low[axis] + (1 - least) * size_mm);
   return at;
 }
 
-/// Where along the edge the set ends.
-Cells::Crossing Cells::crossing(const Cut& cut, bool low_is_inside) const {
+/// What an edge of the leaf passes.
+Octree::Crossing Octree::crossing(const Edge& edge, const Leaf& leaf) const {
   constexpr double beside = 1e-5;       // of an edge: where a triangle's sides are looked at
   constexpr double least = 1.0 / 1024;  // so that no two crossings are at one place
-  const Vec3d from = position(coordOf(cut.corner));
+  const Vec3d from = position(edge.low);
+  const double size_mm = edge.size * unit_mm_;
   Vec3d along(0.0);
-  along[cut.axis] = cell_mm_;
-  const int u = (cut.axis + 1) % 3;
-  const int v = (cut.axis + 2) % 3;
+  along[edge.axis] = size_mm;
+  const int u = (edge.axis + 1) % 3;
+  const int v = (edge.axis + 2) % 3;
   struct Pierced {
     double t;
     Vec3d normal;
+
+    bool operator<(const Pierced& other) const { return t < other.t; }
   };
   std::vector<Pierced> pierced;
-  for (const Touch& touch : touchesOf(cut.corner)) {
-    const std::array<Vec3d, 3> at = corners(touch.triangle);
+  for (const std::uint32_t triangle : touchesOf(leaf)) {
+    const std::array<Vec3d, 3> at = corners(triangle);
     const Vec3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
-    if (normal[cut.axis] == 0) continue;
+    if (normal[edge.axis] == 0) continue;
     int left = 0;
     for (std::size_t side = 0; side < 3; ++side) {
       const Vec3d& a = at[side];
       const Vec3d& b = at[(side + 1) % 3];
       left += (b[u] - a[u]) * (from[v] - a[v]) - (b[v] - a[v]) * (from[u] - a[u]) >= 0 ? 1 : 0;
     }
-    if (left != (normal[cut.axis] > 0 ? 3 : 0)) continue;
-    const double t = normal.dot(at[0] - from) / (normal[cut.axis] * cell_mm_);
-    if (t > beside && t < 1 - beside) pierced.push_back({t, normal});
+    if (left != (normal[edge.axis] > 0 ? 3 : 0)) continue;
+    const double t = normal.dot(at[0] - from) / (normal[edge.axis] * size_mm);
+    if (t > beside && t < 1 - beside) pierced.push_back({t, normal / normal.length()});
   }
-  std::sort(pierced.begin(), pierced.end(),
-            [](const Pierced& a, const Pierced& b) { return a.t < b.t; });
+  std::stable_sort(pierced.begin(), pierced.end());
+  const bool low_is_inside = isInside(edge.low);
+  Coord high_corner = edge.low;
+  high_corner[edge.axis] += edge.size;
+  const bool high_is_inside = isInside(high_corner);
+  // The first stretch between triangles whose ends differ, or the first triangle whose sides do.
+  Crossing crossing;
+  const auto cross = [&](double t, const Vec3d& normal) {
+    if (crossing.passes++ > 0) return;
+    crossing.at = from + along * std::clamp(t, least, 1 - least);
+    crossing.normal = normal;
+  };
+  const auto crossSmoothly = [&](double low, double high) {
+    const double t = crossing.passes > 0 ? low : smoothCrossing(from, along, low, high);
+    cross(t, crossing.passes > 0 ? Vec3d(0.0) : gradientAt(from + along * t, 0.01 * size_mm));
+  };
   double low = 0;
-  double high = 1;
-  auto first = pierced.begin();
-  auto last = pierced.end();
-  while (first != last) {
-    const auto middle = first + (last - first) / 2;
-    if (isInside(from + along * (middle->t - beside)) != low_is_inside) {
-      high = middle->t - beside;
-      last = middle;
-    } else if (isInside(from + along * (middle->t + beside)) != low_is_inside) {
-      return {from + along * std::clamp(middle->t, least, 1 - least),
-              middle->normal / middle->normal.length()};
-    } else {
-      low = middle->t + beside;
-      first = middle + 1;
-    }
+  bool last = low_is_inside;
+  for (std::size_t i = 0; i < pierced.size(); ++i) {
+    const double t = pierced[i].t;
+    const bool before = isInside(from + along * (t - beside));
+    const bool after = isInside(from + along * (t + beside));
+    if (before != last) crossSmoothly(low, t - beside);
+    if (before != after) cross(t, pierced[i].normal);
+    low = t + beside;
+    last = after;
   }
-  const double t = high > low ? smoothCrossing(from, along, low, high) : low;
-  const Vec3d at = from + along * std::clamp(t, least, 1 - least);
-  return {at, gradientAt(at)};
+  if (last != high_is_inside) crossSmoothly(low, 1);
+  return crossing;
 }
 
-/// The polygons of a case of marching cubes.
-struct Sheets {
-  std::array<std::int8_t, 12> of{};  ///< by edge; −1 where it is not cut
-  std::int8_t count = 0;
-};
-const std::array<Sheets, 256>& sheetsOfCases() {
-  static const std::array<Sheets, 256> all = [] {
-    std::array<Sheets, 256> made;
-    for (std::size_t inside = 0; inside < 256; ++inside) {
-      Sheets& sheets = made[inside];
-      std::array<std::uint8_t, 12> root;
-      for (std::uint8_t edge = 0; edge < 12; ++edge) root[edge] = edge;
-      const auto join = [&](std::uint8_t a, std::uint8_t b) {
-        const std::uint8_t from = root[b];
-        for (std::uint8_t& r : root)
-          if (r == from) r = root[a];
-      };
-      for (const auto& t : cubeCases()[inside].triangles) {
-        join(t[0], t[1]);
-        join(t[0], t[2]);
-      }
-      sheets.of.fill(-1);
-      for (std::size_t edge = 0; edge < 12; ++edge) {
-        if ((cubeCases()[inside].edges >> edge & 1) == 0) continue;
-        for (std::size_t before = 0; before < edge; ++before)
-          if (root[before] == root[edge] && sheets.of[before] >= 0)
-            sheets.of[edge] = sheets.of[before];
-        if (sheets.of[edge] < 0) sheets.of[edge] = sheets.count++;
-      }
-    }
-    return made;
-  }();
-  return all;
-}
-
-Mesh Cells::surface(const Stretch& stretch) const {
-  struct Mixed {
-    Key cell;
-    int inside;
+Mesh Octree::surface() const {
+  // The edges that are cut and have no smaller leaf beside them, each with the leaves around it.
+  struct Around {
+    Key edge;
+    std::array<std::uint32_t, 4> leaves;
   };
-  std::vector<Mixed> mixed;
-  std::vector<Key> edges;  // thrice its corner, plus its axis
-  const openvdb::tree::ValueAccessor<const openvdb::BoolTree, false> corners_at(corners_);
-  const auto edgeOf = [](const Coord& cell, int edge) {
-    const int axis = edge / 4;
-    Coord corner = cell;
-    corner[axis == 0 ? 1 : 0] += edge & 1;
-    corner[axis == 2 ? 1 : 2] += edge >> 1 & 1;
-    return 3 * keyOf(corner) + static_cast<Key>(axis);
-  };
-  for (const Key key : cells_) {
-    const Coord cell = coordOf(key);
-    const int inside = insideOf(cell, corners_at);
-    if (inside == 0 || inside == 0xff) continue;
-    mixed.push_back({key, inside});
-    const unsigned cut = cubeCases()[static_cast<std::size_t>(inside)].edges;
-    for (int edge = 0; edge < 12; ++edge)
-      if ((cut >> edge & 1) != 0) edges.push_back(edgeOf(cell, edge));
+  std::vector<Key> edges;
+  for (const Leaf& leaf : leaves_) {
+    if (leaf.divided) continue;
+    for (int e = 0; e < 12; ++e)
+      if (isCut(edgeOf(leaf, e))) edges.push_back(edgeKey(edgeOf(leaf, e)));
   }
   sortUnique(edges);
-
-  const auto place = [&](Key edge) {
-    return static_cast<std::size_t>(std::lower_bound(edges.begin(), edges.end(), edge) -
-                                    edges.begin());
-  };
-  std::vector<Crossing> crossings(edges.size());
-  forAll(edges.size(), stretch, [&](std::size_t i) {
-    const Cut cut{edges[i] / 3, static_cast<int>(edges[i] % 3)};
-    crossings[i] = crossing(cut, corners_.getValue(coordOf(cut.corner)));
-  });
-  std::vector<std::uint32_t> first_vertex(mixed.size() + 1);  // of a cell
-  first_vertex[0] = static_cast<std::uint32_t>(edges.size());
-  for (std::size_t i = 0; i < mixed.size(); ++i)
-    first_vertex[i + 1] =
-        first_vertex[i] + static_cast<std::uint32_t>(
-                              sheetsOfCases()[static_cast<std::size_t>(mixed[i].inside)].count);
-  Mesh mesh;
-  mesh.vertices.resize(first_vertex.back());
-  for (std::size_t i = 0; i < edges.size(); ++i) mesh.vertices[i] = crossings[i].at;
-  tbb::parallel_for(std::size_t{0}, mixed.size(), [&](std::size_t i) {
-    const Coord cell = coordOf(mixed[i].cell);
-    const Sheets& sheets = sheetsOfCases()[static_cast<std::size_t>(mixed[i].inside)];
-    for (int sheet = 0; sheet < sheets.count; ++sheet) {
-      std::array<Crossing, 12> own;
-      std::size_t count = 0;
-      for (int edge = 0; edge < 12; ++edge)
-        if (sheets.of[static_cast<std::size_t>(edge)] == sheet)
-          own[count++] = crossings[place(edgeOf(cell, edge))];
-      mesh.vertices[first_vertex[i] + static_cast<std::uint32_t>(sheet)] =
-          meet(cell, {own.data(), count});
-    }
-  });
-  mesh.triangles.resize(4 * edges.size());
+  std::vector<Around> cut(edges.size());
   tbb::parallel_for(std::size_t{0}, edges.size(), [&](std::size_t i) {
-    const auto axis = static_cast<int>(edges[i] % 3);
-    const Coord corner = coordOf(edges[i] / 3);
-    const int u = (axis + 1) % 3;
-    const int v = (axis + 2) % 3;
-    // Around the edge, counter-clockwise seen from its upper end.
-    std::array<std::uint32_t, 4> around;
-    for (std::size_t turn = 0; turn < 4; ++turn) {
-      const bool at_u = turn == 1 || turn == 2;
-      const bool at_v = turn == 2 || turn == 3;
-      Coord cell = corner;
-      cell[u] -= at_u;
-      cell[v] -= at_v;
-      const Key key = keyOf(cell);
-      const auto found = std::lower_bound(mixed.begin(), mixed.end(), key,
-                                          [](const Mixed& m, Key k) { return m.cell < k; });
-      // Edges are numbered by the lower of the other axes first.
-      const bool low_at = axis == 1 ? at_v : axis == 0 ? at_u : at_u;
-      const bool high_at = axis == 1 ? at_u : at_v;
-      const int edge = axis == 2 ? 8 + at_u + 2 * at_v : 4 * axis + low_at + 2 * high_at;
-      const auto sheet = sheetsOfCases()[static_cast<std::size_t>(found->inside)]
-                             .of[static_cast<std::size_t>(edge)];
-      around[turn] = first_vertex[static_cast<std::size_t>(found - mixed.begin())] +
-                     static_cast<std::uint32_t>(sheet);
+    const Edge edge = edgeOf(edges[i]);
+    cut[i].edge = edges[i];
+    for (int turn = 0; turn < 4; ++turn) {
+      const std::uint32_t leaf = leafAt(beside(edge, turn));
+      if (leaves_[leaf].size < edge.size) cut[i].edge = 0;
+      cut[i].leaves[static_cast<std::size_t>(turn)] = leaf;
     }
-    if (!corners_.getValue(corner)) std::swap(around[1], around[3]);
-    for (std::size_t turn = 0; turn < 4; ++turn)
-      mesh.triangles[4 * i + turn] = {static_cast<std::uint32_t>(i), around[turn],
-                                      around[(turn + 1) % 4]};
   });
+  std::erase_if(cut, [](const Around& around) { return around.edge == 0; });
+
+  Mesh mesh;
+  mesh.vertices.resize(cut.size());
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> of_leaf;  // and which edge
+  for (std::uint32_t i = 0; i < cut.size(); ++i) {
+    mesh.vertices[i] = crossings_.at(cut[i].edge).at;
+    for (const std::uint32_t leaf : cut[i].leaves) of_leaf.emplace_back(leaf, i);
+  }
+  sortUnique(of_leaf);
+  std::vector<std::uint32_t> begins;
+  std::vector<std::uint32_t> vertex(leaves_.size(), none);
+  for (std::uint32_t i = 0; i < of_leaf.size(); ++i)
+    if (i == 0 || of_leaf[i].first != of_leaf[i - 1].first) {
+      vertex[of_leaf[i].first] = static_cast<std::uint32_t>(mesh.vertices.size() + begins.size());
+      begins.push_back(i);
+    }
+  begins.push_back(static_cast<std::uint32_t>(of_leaf.size()));
+  mesh.vertices.resize(cut.size() + begins.size() - 1);
+  tbb::parallel_for(std::size_t{0}, begins.size() - 1, [&](std::size_t i) {
+    std::vector<Crossing> crossings;
+    for (std::uint32_t c = begins[i]; c < begins[i + 1]; ++c)
+      crossings.push_back(crossings_.at(cut[of_leaf[c].second].edge));
+    mesh.vertices[cut.size() + i] = meet(leaves_[of_leaf[begins[i]].first], crossings);
+  });
+  mesh.triangles.reserve(4 * cut.size());
+  for (std::uint32_t i = 0; i < cut.size(); ++i) {
+    std::array<std::uint32_t, 4> around = cut[i].leaves;
+    if (!isInside(edgeOf(cut[i].edge).low)) std::swap(around[1], around[3]);
+    for (std::size_t turn = 0; turn < 4; ++turn) {
+      const std::uint32_t a = vertex[around[turn]];
+      const std::uint32_t b = vertex[around[(turn + 1) % 4]];
+      if (a != b) mesh.triangles.push_back({i, a, b});
+    }
+  }
   return mesh;
 }
 
@@ -544,7 +676,7 @@ double volumeOf(const Mesh& mesh, const Vec3d& about) {
 
 }  // namespace
 
-WindingSurface windingSurface(const Mesh& triangles, const WindingCells& cells,
+WindingSurface windingSurface(const Mesh& triangles, std::size_t most_leaves,
                               const std::function<void(double)>& progress) {
   WindingSurface made;
   Bounds bounds;
@@ -553,8 +685,7 @@ WindingSurface windingSurface(const Mesh& triangles, const WindingCells& cells,
   const double longest_mm =
       bounds.empty() ? 0 : bounds.extents()[static_cast<int>(bounds.maxExtent())];
   if (!(longest_mm > 0)) return made;
-  const double least_mm = std::max(cells.least_mm, longest_mm / most_cells_along);
-  made.cell_mm = std::max(least_mm, longest_mm / coarse_cells);
+  const double unit_mm = longest_mm / coarse_cells / coarse_units;
 
   const Stretch stretch(progress);
   Mesh faced = triangles;
@@ -562,31 +693,21 @@ WindingSurface windingSurface(const Mesh& triangles, const WindingCells& cells,
     for (Mesh::Triangle& t : faced.triangles) std::swap(t[1], t[2]);
   };
   std::array<double, 2> volumes{};
-  std::size_t count = 0;
   for (std::size_t turned = 0; turned < 2; ++turned) {
     const WindingNumber winding(faced);
-    Cells coarse(faced, winding, bounds, made.cell_mm);
-    coarse.find(stretch.part(0.02 * static_cast<double>(turned), 0.02 * (1 + turned)));
-    volumes[turned] = volumeOf(coarse.surface(stretch.part(0, 0)), bounds.getCenter());
-    count = std::max(count, coarse.count());
+    Octree coarse(faced, winding, bounds, unit_mm, 0, 0);
+    coarse.grow(stretch.part(0.05 * static_cast<double>(turned), 0.05 * (1 + turned)));
+    volumes[turned] = volumeOf(coarse.surface(), bounds.getCenter());
     turn();
   }
   made.turned = volumes[1] > 2 * volumes[0];
   if (made.turned) turn();
   const WindingNumber winding(faced);
-  // The cells of a surface grow by the square of their fineness, those of a crowd faster: so they
-  // become finer step by step.
-  for (double done = 0.04;; done = std::min(0.3, done + 0.08)) {
-    const double ratio = std::sqrt(static_cast<double>(count) / static_cast<double>(cells.about));
-    made.cell_mm = std::max(least_mm, made.cell_mm * std::clamp(ratio, 0.5, 1.0));
-    const bool last = ratio > 0.5 || made.cell_mm <= least_mm;
-    Cells fine(faced, winding, bounds, made.cell_mm);
-    fine.find(stretch.part(done, last ? 0.6 : done + 0.08));
-    count = fine.count();
-    if (!last) continue;
-    made.mesh = fine.surface(stretch.part(0.6, 1));
-    return made;
-  }
+  Octree fine(faced, winding, bounds, unit_mm, most_cuts, most_leaves);
+  fine.grow(stretch.part(0.1, 1));
+  made.cell_mm = fine.leastMm();
+  made.mesh = fine.surface();
+  return made;
 }
 
 }  // namespace vdbdither

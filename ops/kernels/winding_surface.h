@@ -14,12 +14,6 @@ struct WindingSurface {
   bool turned = false;  ///< the triangles face inwards: what counts is the number below −½
 };
 
-/// How fine the cells of a winding surface are.
-struct WindingCells {
-  double least_mm = 0;            ///< no finer than this
-  std::size_t about = 1'500'000;  ///< so many: they become as fine as that allows
-};
-
 /// The surface of the set where the generalized winding number of any set of triangles exceeds ½
 /// (Jacobson, Kavan, Sorkine-Hornung: "Robust inside-outside segmentation using generalized winding
 /// numbers", 2013): on the triangles where they part it from the rest, and between them where the
@@ -33,7 +27,7 @@ struct WindingCells {
 /// for any number of threads.
 ///
 /// `triangles` in mm. `progress` is told fractions, from the calling thread.
-WindingSurface windingSurface(const Mesh& triangles, const WindingCells& cells = {},
+WindingSurface windingSurface(const Mesh& triangles, std::size_t most_leaves = 1'500'000,
                               const std::function<void(double)>& progress = {});
 
 }  // namespace vdbdither
