@@ -10,6 +10,7 @@
 #include "ops/kernels/mesh_placement.h"
 #include "ops/kernels/mesh_repair.h"
 #include "ops/kernels/part_index.h"
+#include "ops/kernels/winding_surface.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
@@ -70,9 +71,12 @@ class MeshToSdf : public Source {
     Mesh mesh = readMeshes();
     place(mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
     questionSize(mesh, schema);
+    // Triangles that enclose nothing become what they hint at, which may reach farther.
+    std::vector<Mesh> parts = closeLoose(mesh);
     schema.lattice = latticeAround(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
-    planParts(mesh, lattice);
+    for (const Mesh& part : parts)
+      parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
     const SwallowedWalls walls = repair(mesh);
     triangles_ = static_cast<double>(mesh.triangles.size());
     const std::vector<double> leaves = leavesOfRows(mesh, lattice);
@@ -114,16 +118,12 @@ class MeshToSdf : public Source {
 
   /// Makes the mesh bound a solid and finds what of it is no surface of that.
   SwallowedWalls repair(Mesh& mesh) const {
-    MeshRepairs repairs;
-    mesh = repaired(std::move(mesh), repairs);
+    MeshRepairs repairs = repairs_;
+    if (!is_closed_) mesh = repaired(std::move(mesh), repairs);
     if (mesh.triangles.empty())
       throw DataError("the mesh has no surface: all its triangles are degenerate or cancel");
-    const std::size_t sides = 3 * (mesh.triangles.size() - repairs.filling_triangles);
-    if (2 * repairs.boundary_edges > sides)
-      throw DataError("the triangles enclose nothing: " + std::to_string(repairs.boundary_edges) +
-                      " of their " + std::to_string(sides) +
-                      " sides meet no other; join them in a mesh editor first");
-    SwallowedWalls walls = swallowedWalls(mesh);
+    SwallowedWalls walls;
+    if (!is_wound_) walls = swallowedWalls(mesh);
     repairs.swallowed_triangles = walls.swallowed;
     repairs.cut_triangles = walls.cut;
     const std::vector<std::string> lines = repairs.lines();
@@ -136,11 +136,77 @@ class MeshToSdf : public Source {
     report().count("duplicate_triangles", static_cast<double>(repairs.duplicate_triangles));
     report().count("flipped_triangles", static_cast<double>(repairs.flipped_triangles));
     report().count("turned_parts", static_cast<double>(repairs.turned_parts));
-    report().count("boundary_edges", static_cast<double>(repairs.boundary_edges));
+    report().count("boundary_edges", static_cast<double>(repairs.boundary_edges + loose_edges_));
     report().count("closed_holes", static_cast<double>(repairs.closed_holes));
+    report().count("loose_triangles", static_cast<double>(loose_triangles_));
     report().count("swallowed_triangles", static_cast<double>(repairs.swallowed_triangles));
     report().count("cut_triangles", static_cast<double>(repairs.cut_triangles));
     return walls;
+  }
+
+  /// Puts the surface of what they hint at in the place of the triangles of files that enclose
+  /// nothing. Of several files, each by itself, made to bound a solid; what is repaired in them is
+  /// told of the whole.
+  std::vector<Mesh> closeLoose(Mesh& mesh) {
+    if (triangle_counts_.size() == 1) {
+      Mesh closed = repaired(mesh, repairs_);
+      is_closed_ = true;
+      is_wound_ = repairs_.areOfLooseTriangles(closed.triangles.size());
+      if (is_wound_) closed = windingSurfaceOf(std::move(mesh), closed.triangles.size(), repairs_);
+      mesh = std::move(closed);
+      return {};
+    }
+    std::vector<Mesh> parts;
+    std::vector<Mesh> whole;
+    std::size_t first = 0;
+    for (const std::size_t count : triangle_counts_) {
+      Mesh part{mesh.vertices, {}};
+      const auto begin = mesh.triangles.begin() + static_cast<std::ptrdiff_t>(first);
+      part.triangles.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
+      first += count;
+      MeshRepairs repairs;
+      Mesh closed = repaired(part, repairs);
+      if (repairs.areOfLooseTriangles(closed.triangles.size())) {
+        closed = windingSurfaceOf(std::move(part), closed.triangles.size(), repairs);
+        part = closed;
+      }
+      parts.push_back(std::move(closed));
+      whole.push_back(std::move(part));
+    }
+    mesh = joined(std::move(whole));
+    return parts;
+  }
+
+  /// `closed_triangles`: what its repair would come to, `repairs`: what that would be, and what is
+  /// left of it.
+  Mesh windingSurfaceOf(Mesh loose, std::size_t closed_triangles, MeshRepairs& repairs) {
+    const std::string open = std::to_string(repairs.boundary_edges) + " of their " +
+                             std::to_string(3 * (closed_triangles - repairs.filling_triangles)) +
+                             " sides meet no other";
+    if (strict_)
+      throw DataError(
+          "the mesh needs repair, which --strict forbids: the triangles enclose nothing, " + open);
+    if (extras_.closest)
+      throw DataError("the triangles enclose nothing, " + open +
+                      ", and of the surface that they hint at --closest cannot tell the triangle; "
+                      "leave it out");
+    loose_edges_ += repairs.boundary_edges;
+    repairs = {};
+    loose = withoutDuplicates(std::move(loose), repairs);
+    loose_triangles_ += loose.triangles.size();
+    const WindingSurface surface =
+        windingSurface(loose, [this](double fraction) { report().progress(fraction); });
+    if (surface.mesh.triangles.empty())
+      throw DataError("the triangles enclose nothing: " + open +
+                      ", and their winding number is above one half nowhere; join them in a mesh "
+                      "editor first");
+    report().warn("the triangles enclose nothing, " + open +
+                  ": the part is guessed, as where their winding number is above one half" +
+                  (surface.turned ? ", seen from behind since they face inwards" : "") +
+                  ", on cells down to " + shortestText(std::round(surface.cell_mm * 1e4) / 1e4) +
+                  " mm");
+    report().count("winding_cell_mm", surface.cell_mm);
+    return surface.mesh;
   }
 
   Mesh readMeshes() {
@@ -150,21 +216,6 @@ class MeshToSdf : public Source {
       triangle_counts_.push_back(meshes.back().triangles.size());
     }
     return joined(std::move(meshes));
-  }
-
-  /// A field of its own for each file of several. What is repaired in them is told of the whole.
-  void planParts(const Mesh& all, const Lattice& lattice) {
-    if (paths_.size() < 2) return;
-    std::size_t first = 0;
-    for (const std::size_t count : triangle_counts_) {
-      Mesh part{all.vertices, {}};
-      const auto begin = all.triangles.begin() + static_cast<std::ptrdiff_t>(first);
-      part.triangles.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
-      MeshRepairs repairs;
-      part = repaired(std::move(part), repairs);
-      parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
-      first += count;
-    }
   }
 
   /// Warns of a part that is hardly meant to be as large or as small as it is.
@@ -294,7 +345,12 @@ class MeshToSdf : public Source {
   std::unique_ptr<MeshDistance> field_;
   double triangles_ = 0;
   std::vector<std::size_t> triangle_counts_;  ///< of every file
-  std::vector<MeshDistance> parts_;           ///< of every file, where there are several
+  MeshRepairs repairs_;                       ///< of the mesh where that is closed
+  bool is_closed_ = false;
+  bool is_wound_ = false;  ///< and made from its winding number
+  std::uint64_t loose_triangles_ = 0;
+  std::uint64_t loose_edges_ = 0;
+  std::vector<MeshDistance> parts_;  ///< of every file, where there are several
 };
 
 }  // namespace

@@ -50,7 +50,7 @@ constexpr double coarse_cells = 64;
 constexpr int most_cuts = 5;
 constexpr int coarse_units = 1 << most_cuts;
 /// What a vertex may miss the tangents at the crossings of its cell by, of the longest side.
-constexpr double tolerance = 1e-4;
+constexpr double tolerance = 2e-4;
 
 Key keyOf(const Coord& ijk) {
   const auto part = [](int index) { return static_cast<Key>(index + key_offset); };
@@ -500,13 +500,13 @@ double Octree::smoothCrossing(const Vec3d& from, const Vec3d& along, double low,
   return 0.5 * (low + high);
 }
 
-/// The direction in which the number changes, where no triangle is near.
+/// The direction in which the number changes where it is ½ and no triangle is near.
 Vec3d Octree::gradientAt(const Vec3d& p, double step_mm) const {
   Vec3d gradient;
   for (int axis = 0; axis < 3; ++axis) {
     Vec3d step(0.0);
     step[axis] = step_mm;
-    gradient[axis] = winding_.closelyAt(p + step) - winding_.closelyAt(p - step);
+    gradient[axis] = winding_.closelyAt(p + step) - 0.5;
   }
   const double length = gradient.length();
   return length > 0 ? gradient / length : gradient;
@@ -533,7 +533,8 @@ Vec3d Octree::meet(const Leaf& leaf, std::span<const Crossing> crossings) const 
   Vec3d at = middle;
   for (int i = 0; i < 3; ++i) {
     const Vec3d direction(directions(0, i), directions(1, i), directions(2, i));
-    if (strengths[i] > 0.02) at += direction * (direction.dot(pull) / strengths[i]);
+    if (strengths[i] > 0.05 * static_cast<double>(crossings.size()))
+      at += direction * (direction.dot(pull) / strengths[i]);
   }
   const Vec3d low = position(leaf.low);
   const double size_mm = leaf.size * unit_mm_;
@@ -594,8 +595,10 @@ Octree::Crossing Octree::crossing(const Edge& edge, const Leaf& leaf) const {
   bool last = low_is_inside;
   for (std::size_t i = 0; i < pierced.size(); ++i) {
     const double t = pierced[i].t;
-    const bool before = isInside(from + along * (t - beside));
-    const bool after = isInside(from + along * (t + beside));
+    // Across a triangle the number jumps by one.
+    const double number = winding_.judgedAt(from + along * (t - beside));
+    const bool before = number > 0.5;
+    const bool after = number - (pierced[i].normal[edge.axis] > 0 ? 1 : -1) > 0.5;
     if (before != last) crossSmoothly(low, t - beside);
     if (before != after) cross(t, pierced[i].normal);
     low = t + beside;
@@ -676,8 +679,8 @@ double volumeOf(const Mesh& mesh, const Vec3d& about) {
 
 }  // namespace
 
-WindingSurface windingSurface(const Mesh& triangles, std::size_t most_leaves,
-                              const std::function<void(double)>& progress) {
+WindingSurface windingSurface(const Mesh& triangles, const std::function<void(double)>& progress,
+                              std::size_t most_leaves) {
   WindingSurface made;
   Bounds bounds;
   for (const Mesh::Triangle& t : triangles.triangles)

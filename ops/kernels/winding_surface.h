@@ -27,7 +27,8 @@ struct WindingSurface {
 /// for any number of threads.
 ///
 /// `triangles` in mm. `progress` is told fractions, from the calling thread.
-WindingSurface windingSurface(const Mesh& triangles, std::size_t most_leaves = 1'500'000,
-                              const std::function<void(double)>& progress = {});
+WindingSurface windingSurface(const Mesh& triangles,
+                              const std::function<void(double)>& progress = {},
+                              std::size_t most_leaves = 1'500'000);
 
 }  // namespace vdbdither
