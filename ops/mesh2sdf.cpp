@@ -25,6 +25,7 @@ using openvdb::Vec3d;
 
 /// `meshes` in one, one after the other.
 Mesh joined(std::vector<Mesh> meshes) {
+  if (meshes.empty()) return {};
   Mesh all = std::move(meshes.front());
   for (auto mesh = meshes.begin() + 1; mesh != meshes.end(); ++mesh) {
     const auto first = static_cast<std::uint32_t>(all.vertices.size());
@@ -71,18 +72,17 @@ class MeshToSdf : public Source {
     Mesh mesh = readMeshes();
     place(mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
     questionSize(mesh, schema);
-    // Triangles that enclose nothing become what they hint at, which may reach farther.
-    std::vector<Mesh> parts = closeLoose(mesh);
+    const std::vector<Mesh> parts = closed(mesh);  // which a guess may make larger
     schema.lattice = latticeAround(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
     for (const Mesh& part : parts)
       parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
-    const SwallowedWalls walls = repair(mesh);
+    const SwallowedWalls hidden = wallsOf(mesh);
     triangles_ = static_cast<double>(mesh.triangles.size());
     const std::vector<double> leaves = leavesOfRows(mesh, lattice);
     schema.leaves_per_row = *std::max_element(leaves.begin(), leaves.end());
     schema.leaves = std::accumulate(leaves.begin(), leaves.end(), 0.0);
-    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, walls);
+    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, hidden);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
@@ -109,6 +109,10 @@ class MeshToSdf : public Source {
   }
 
  private:
+  struct MeshSize {
+    std::size_t vertices, triangles;
+  };
+
   static Band bandFrom(const std::string& text) {
     const bool diameters = text.find_first_not_of("0123456789.") == std::string::npos;
     const double size = parseLengthMm(text);
@@ -116,14 +120,13 @@ class MeshToSdf : public Source {
     return diameters ? Band{size, 0} : Band{0, size};
   }
 
-  /// Makes the mesh bound a solid and finds what of it is no surface of that.
-  SwallowedWalls repair(Mesh& mesh) const {
+  /// What of the closed mesh is no surface, with what was repaired told or refused.
+  SwallowedWalls wallsOf(const Mesh& mesh) const {
     MeshRepairs repairs = repairs_;
-    if (!is_closed_) mesh = repaired(std::move(mesh), repairs);
     if (mesh.triangles.empty())
       throw DataError("the mesh has no surface: all its triangles are degenerate or cancel");
     SwallowedWalls walls;
-    if (!is_wound_) walls = swallowedWalls(mesh);
+    if (!is_guess_) walls = swallowedWalls(mesh);
     repairs.swallowed_triangles = walls.swallowed;
     repairs.cut_triangles = walls.cut;
     const std::vector<std::string> lines = repairs.lines();
@@ -144,42 +147,41 @@ class MeshToSdf : public Source {
     return walls;
   }
 
-  /// Puts the surface of what they hint at in the place of the triangles of files that enclose
-  /// nothing. Of several files, each by itself, made to bound a solid; what is repaired in them is
-  /// told of the whole.
-  std::vector<Mesh> closeLoose(Mesh& mesh) {
-    if (triangle_counts_.size() == 1) {
-      Mesh closed = repaired(mesh, repairs_);
-      is_closed_ = true;
-      is_wound_ = repairs_.areOfLooseTriangles(closed.triangles.size());
-      if (is_wound_) closed = windingSurfaceOf(std::move(mesh), closed.triangles.size(), repairs_);
-      mesh = std::move(closed);
-      return {};
-    }
+  /// Makes `mesh` bound a solid: by repair, or where triangles of a file enclose nothing by the
+  /// surface of what they hint at. Of several files also each by itself; what is repaired in them
+  /// is told of the whole.
+  std::vector<Mesh> closed(Mesh& mesh) {
     std::vector<Mesh> parts;
-    std::vector<Mesh> whole;
-    std::size_t first = 0;
-    for (const std::size_t count : triangle_counts_) {
-      Mesh part{mesh.vertices, {}};
-      const auto begin = mesh.triangles.begin() + static_cast<std::ptrdiff_t>(first);
-      part.triangles.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
-      first += count;
+    std::vector<Mesh> meshes;
+    std::vector<Mesh> guesses;
+    for (Mesh& part : separated(mesh)) {
       MeshRepairs repairs;
-      Mesh closed = repaired(part, repairs);
-      if (repairs.areOfLooseTriangles(closed.triangles.size())) {
-        closed = windingSurfaceOf(std::move(part), closed.triangles.size(), repairs);
-        part = closed;
+      parts.push_back(repaired(part, repairs));
+      if (repairs.areOfLooseTriangles(parts.back().triangles.size())) {
+        parts.back() = guessed(std::move(part), parts.back().triangles.size(), repairs);
+        guesses.push_back(parts.back());
+      } else if (paths_.size() == 1) {
+        repairs_ = repairs;
+        meshes.push_back(std::move(parts.back()));
+      } else {
+        meshes.push_back(std::move(part));
       }
-      parts.push_back(std::move(closed));
-      whole.push_back(std::move(part));
     }
-    mesh = joined(std::move(whole));
+    mesh = joined(std::move(meshes));
+    if (paths_.size() == 1) {
+      parts.clear();
+    } else {
+      mesh = repaired(std::move(mesh), repairs_);
+    }
+    is_guess_ = mesh.triangles.empty() && !guesses.empty();
+    guesses.insert(guesses.begin(), std::move(mesh));
+    mesh = joined(std::move(guesses));
     return parts;
   }
 
-  /// `closed_triangles`: what its repair would come to, `repairs`: what that would be, and what is
-  /// left of it.
-  Mesh windingSurfaceOf(Mesh loose, std::size_t closed_triangles, MeshRepairs& repairs) {
+  /// The surface of what loose triangles hint at. Repairing them took `closed_triangles` and
+  /// `repairs`.
+  Mesh guessed(Mesh loose, std::size_t closed_triangles, const MeshRepairs& repairs) {
     const std::string open = std::to_string(repairs.boundary_edges) + " of their " +
                              std::to_string(3 * (closed_triangles - repairs.filling_triangles)) +
                              " sides meet no other";
@@ -188,11 +190,10 @@ class MeshToSdf : public Source {
           "the mesh needs repair, which --strict forbids: the triangles enclose nothing, " + open);
     if (extras_.closest)
       throw DataError("the triangles enclose nothing, " + open +
-                      ", and of the surface that they hint at --closest cannot tell the triangle; "
-                      "leave it out");
+                      ": the part is guessed, and no point of its surface has a triangle for "
+                      "--closest to name; leave it out");
     loose_edges_ += repairs.boundary_edges;
-    repairs = {};
-    loose = withoutDuplicates(std::move(loose), repairs);
+    loose = withoutDuplicates(std::move(loose), repairs_);
     loose_triangles_ += loose.triangles.size();
     const WindingSurface surface =
         windingSurface(loose, [this](double fraction) { report().progress(fraction); });
@@ -213,9 +214,29 @@ class MeshToSdf : public Source {
     std::vector<Mesh> meshes;
     for (const std::string& path : paths_) {
       meshes.push_back(readMesh(path, [this](const std::string& text) { report().warn(text); }));
-      triangle_counts_.push_back(meshes.back().triangles.size());
+      sizes_.push_back({meshes.back().vertices.size(), meshes.back().triangles.size()});
     }
     return joined(std::move(meshes));
+  }
+
+  /// What was joined, file by file.
+  [[nodiscard]] std::vector<Mesh> separated(const Mesh& all) const {
+    std::vector<Mesh> meshes;
+    auto vertex = all.vertices.begin();
+    auto triangle = all.triangles.begin();
+    std::uint32_t first = 0;
+    for (const MeshSize& size : sizes_) {
+      const auto vertices = static_cast<std::ptrdiff_t>(size.vertices);
+      const auto triangles = static_cast<std::ptrdiff_t>(size.triangles);
+      Mesh& mesh =
+          meshes.emplace_back(Mesh{{vertex, vertex + vertices}, {triangle, triangle + triangles}});
+      for (Mesh::Triangle& t : mesh.triangles)
+        for (std::uint32_t& v : t) v -= first;
+      vertex += vertices;
+      triangle += triangles;
+      first += static_cast<std::uint32_t>(size.vertices);
+    }
+    return meshes;
   }
 
   /// Warns of a part that is hardly meant to be as large or as small as it is.
@@ -344,10 +365,9 @@ class MeshToSdf : public Source {
   double held_band_mm_ = 0;
   std::unique_ptr<MeshDistance> field_;
   double triangles_ = 0;
-  std::vector<std::size_t> triangle_counts_;  ///< of every file
-  MeshRepairs repairs_;                       ///< of the mesh where that is closed
-  bool is_closed_ = false;
-  bool is_wound_ = false;  ///< and made from its winding number
+  std::vector<MeshSize> sizes_;  ///< of every file
+  MeshRepairs repairs_;
+  bool is_guess_ = false;  ///< all of it, made from the winding number
   std::uint64_t loose_triangles_ = 0;
   std::uint64_t loose_edges_ = 0;
   std::vector<MeshDistance> parts_;  ///< of every file, where there are several

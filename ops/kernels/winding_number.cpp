@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint32_t triangles_per_leaf = 8;
 
 /// Nearer to ½ than this a number is asked for again, more accurately.
-constexpr double rough_doubt = 0.02;
+constexpr double rough_doubt = 0.01;
 constexpr double close_doubt = 0.0005;
 
 double fromHalf(double number) { return std::abs(std::abs(number) - 0.5); }

@@ -29,10 +29,10 @@ class WindingNumber {
   /// From every triangle, in double.
   [[nodiscard]] double exactAt(const openvdb::Vec3d& p) const;
 
-  /// Within 0.02 of the exact number, mostly within 0.001.
+  /// Within 0.01 of the exact number, mostly within 0.001.
   [[nodiscard]] double at(const openvdb::Vec3d& p) const { return sum(p, rough_radii); }
 
-  /// Within 0.0005 of the exact number, mostly within 0.00001.
+  /// Within 0.0005 of the exact number, mostly within 0.00005.
   [[nodiscard]] double closelyAt(const openvdb::Vec3d& p) const { return sum(p, close_radii); }
 
   /// On the side of ½, and of −½, on which the exact number is; as near to it as that takes.
@@ -41,7 +41,7 @@ class WindingNumber {
  private:
   /// From how many radii a group counts as one.
   static constexpr double rough_radii = 2.5;
-  static constexpr double close_radii = 8;
+  static constexpr double close_radii = 5;
 
   /// Moments of its triangles' vector areas a about the centre, x being the place of each.
   struct Node {

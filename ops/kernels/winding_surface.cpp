@@ -73,6 +73,18 @@ struct Scattered {
 template <class T>
 using Map = std::unordered_map<Key, T, Scattered>;
 
+/// Erases what `is_done` says, which is asked on all threads.
+template <class T, class IsDone>
+void eraseAll(std::vector<T>& values, const IsDone& is_done) {
+  std::vector<char> done(values.size());
+  tbb::parallel_for(std::size_t{0}, values.size(),
+                    [&](std::size_t i) { done[i] = is_done(values[i]) ? 1 : 0; });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (done[i] == 0) values[kept++] = values[i];
+  values.resize(kept);
+}
+
 template <class T>
 void sortUnique(std::vector<T>& values) {
   tbb::parallel_sort(values.begin(), values.end());
@@ -153,6 +165,7 @@ class Octree {
     Coord low;
     int size;  ///< in units
     bool divided = false;
+    std::uint8_t inside = 0;             ///< by corner, a bit each
     std::uint32_t first = 0, count = 0;  ///< the triangles that meet it, in touches_
   };
   /// Of an edge between corners, or a part of one, which no other ends within.
@@ -201,16 +214,14 @@ class Octree {
     const auto found = inside_.find(keyOf(corner));
     return found != inside_.end() && found->second;
   }
-  [[nodiscard]] bool isCut(const Edge& edge) const {
-    Coord high = edge.low;
-    high[edge.axis] += edge.size;
-    return isInside(edge.low) != isInside(high);
-  }
-  [[nodiscard]] int insideOf(const Leaf& leaf) const {
-    int inside = 0;
+  [[nodiscard]] std::uint8_t insideOf(const Leaf& leaf) const {
+    unsigned inside = 0;
     for (int corner = 0; corner < 8; ++corner)
-      if (isInside(cornerOf(leaf, corner))) inside |= 1 << corner;
-    return inside;
+      if (isInside(cornerOf(leaf, corner))) inside |= 1U << corner;
+    return static_cast<std::uint8_t>(inside);
+  }
+  static bool isCut(const Leaf& leaf, int edge) {
+    return (cubeCases()[leaf.inside].edges >> edge & 1) != 0;
   }
 
   void addTouched();
@@ -390,30 +401,31 @@ void Octree::grow(const Stretch& stretch) {
   while (!fresh.empty()) {
     // How much is still to come nobody knows.
     const double next = done + 0.25 * (1 - done);
-    asked.clear();
-    for (const std::uint32_t leaf : fresh)
-      for (int corner = 0; corner < 8; ++corner) {
-        const Coord at = cornerOf(leaves_[leaf], corner);
-        if (limits_.isInside(at) && !inside_.contains(keyOf(at))) asked.push_back(keyOf(at));
-      }
+    asked.resize(8 * fresh.size());
+    tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t i) {
+      asked[i] = keyOf(cornerOf(leaves_[fresh[i / 8]], static_cast<int>(i % 8)));
+    });
     sortUnique(asked);
+    eraseAll(asked,
+             [this](Key key) { return !limits_.isInside(coordOf(key)) || inside_.contains(key); });
     inside.assign(asked.size(), 0);
     forAll(asked.size(), stretch.part(done, 0.5 * (done + next)),
            [&](std::size_t i) { inside[i] = isInside(position(coordOf(asked[i]))) ? 1 : 0; });
     for (std::size_t i = 0; i < asked.size(); ++i) inside_[asked[i]] = inside[i] != 0;
+    tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
+      leaves_[fresh[i]].inside = insideOf(leaves_[fresh[i]]);
+    });
 
     edges.clear();
     for (const std::uint32_t leaf : fresh)
-      for (int e = 0; e < 12; ++e) {
-        const Edge edge = edgeOf(leaves_[leaf], e);
-        const Key key = edgeKey(edge);
-        if ((leaves_[leaf].count > 0 || isCut(edge)) && !crossings_.contains(key))
-          edges.emplace_back(key, leaf);
-      }
+      for (int e = 0; e < 12; ++e)
+        if (leaves_[leaf].count > 0 || isCut(leaves_[leaf], e))
+          edges.emplace_back(edgeKey(edgeOf(leaves_[leaf], e)), leaf);
     tbb::parallel_sort(edges.begin(), edges.end());
     edges.erase(std::unique(edges.begin(), edges.end(),
                             [](const auto& a, const auto& b) { return a.first == b.first; }),
                 edges.end());
+    eraseAll(edges, [this](const auto& edge) { return crossings_.contains(edge.first); });
     crossings.assign(edges.size(), {});
     forAll(edges.size(), stretch.part(0.5 * (done + next), next), [&](std::size_t i) {
       crossings[i] = crossing(edgeOf(edges[i].first), leaves_[edges[i].second]);
@@ -434,11 +446,11 @@ void Octree::grow(const Stretch& stretch) {
     for (std::size_t i = 0; i < fresh.size(); ++i) {
       const Leaf leaf = leaves_[fresh[i]];
       for (int e = 0; e < 12; ++e) {
-        const Edge edge = edgeOf(leaf, e);
-        if (!isCut(edge)) continue;
+        if (!isCut(leaf, e)) continue;
         for (int turn = 0; turn < 4; ++turn) {
           const std::size_t before = leaves_.size();
-          const Coord low = beside(edge, turn) & ~(coarse_units - 1);
+          const Coord low = beside(edgeOf(leaf, e), turn) & ~(coarse_units - 1);
+          if (low == (leaf.low & ~(coarse_units - 1))) continue;
           const std::uint32_t made = add(low, coarse_units);
           if (leaves_.size() > before) grown.push_back(made);
         }
@@ -451,10 +463,10 @@ void Octree::grow(const Stretch& stretch) {
 
 /// Whether one vertex does not tell what the surface does in the leaf.
 bool Octree::tellsTooLittle(const Leaf& leaf) const {
-  const auto inside = static_cast<std::size_t>(insideOf(leaf));
   std::array<Crossing, 12> own;
   std::size_t count = 0;
   for (int e = 0; e < 12; ++e) {
+    if (leaf.count == 0 && !isCut(leaf, e)) continue;
     const auto found = crossings_.find(edgeKey(edgeOf(leaf, e)));
     if (found == crossings_.end()) continue;
     if (found->second.passes > 1) return true;
@@ -462,7 +474,7 @@ bool Octree::tellsTooLittle(const Leaf& leaf) const {
   }
   if (count == 0) return false;
   // One polygon of n sides has n − 2 triangles.
-  const CubeCase& made = cubeCases()[inside];
+  const CubeCase& made = cubeCases()[leaf.inside];
   if (made.triangles.size() + 2 != count) return true;
   const std::span<const Crossing> crossings(own.data(), count);
   const Vec3d at = meet(leaf, crossings);
@@ -479,12 +491,12 @@ double Octree::smoothCrossing(const Vec3d& from, const Vec3d& along, double low,
   double at_low = above(low);
   double at_high = above(high);
   int kept = 0;
-  for (int step = 0; step < 20 && high - low > 1e-4; ++step) {
+  for (int step = 0; step < 20 && high - low > 1e-3; ++step) {
     // The ends were judged by the exact number.
     if ((at_low > 0) == (at_high > 0)) return std::abs(at_low) < std::abs(at_high) ? low : high;
     const double t = low + (high - low) * at_low / (at_low - at_high);
     const double at_t = above(t);
-    if (std::abs(at_t) < 1e-7) return t;
+    if (std::abs(at_t) < 1e-5) return t;
     if ((at_t > 0) == (at_low > 0)) {
       low = t;
       at_low = at_t;
@@ -500,13 +512,14 @@ double Octree::smoothCrossing(const Vec3d& from, const Vec3d& along, double low,
   return 0.5 * (low + high);
 }
 
-/// The direction in which the number changes where it is ½ and no triangle is near.
+/// The direction in which the number changes, where no triangle is near.
 Vec3d Octree::gradientAt(const Vec3d& p, double step_mm) const {
   Vec3d gradient;
+  const double here = winding_.closelyAt(p);
   for (int axis = 0; axis < 3; ++axis) {
     Vec3d step(0.0);
     step[axis] = step_mm;
-    gradient[axis] = winding_.closelyAt(p + step) - 0.5;
+    gradient[axis] = winding_.closelyAt(p + step) - here;
   }
   const double length = gradient.length();
   return length > 0 ? gradient / length : gradient;
@@ -618,7 +631,7 @@ Mesh Octree::surface() const {
   for (const Leaf& leaf : leaves_) {
     if (leaf.divided) continue;
     for (int e = 0; e < 12; ++e)
-      if (isCut(edgeOf(leaf, e))) edges.push_back(edgeKey(edgeOf(leaf, e)));
+      if (isCut(leaf, e)) edges.push_back(edgeKey(edgeOf(leaf, e)));
   }
   sortUnique(edges);
   std::vector<Around> cut(edges.size());
