@@ -204,8 +204,8 @@ class MeshToSdf : public Source {
     report().warn("the triangles enclose nothing, " + open +
                   ": the part is guessed, as where their winding number is above one half" +
                   (surface.turned ? ", seen from behind since they face inwards" : "") +
-                  ", on cells down to " + shortestText(std::round(surface.cell_mm * 1e4) / 1e4) +
-                  " mm");
+                  ", on cells down to " + shortestText(std::round(surface.cell_mm * 1e4) / 10) +
+                  " um");
     report().count("winding_cell_mm", surface.cell_mm);
     return surface.mesh;
   }

@@ -169,7 +169,7 @@ TEST_F(Mesh2Sdf, GuessesThePartOfLooseTrianglesAndSaysSo) {
               testing::ElementsAre(testing::MatchesRegex(
                   "the triangles enclose nothing, 36 of their 36 sides meet no other: the part is "
                   "guessed, as where their winding number is above one half, on cells down to "
-                  "0.0[0-9]+ mm")));
+                  "[0-9.]+ um")));
   EXPECT_EQ(listener_.counts.at("loose_triangles"), 12);
   EXPECT_EQ(listener_.counts.at("boundary_edges"), 36);
   EXPECT_GT(listener_.counts.at("winding_cell_mm"), 0);
@@ -191,10 +191,10 @@ TEST_F(Mesh2Sdf, RefusesLooseTrianglesWhereItMayNotGuess) {
 
 TEST_F(Mesh2Sdf, RefusesTrianglesThatHintAtNothing) {
   Mesh loose = test::boxMesh({1, 2, 3}, {2, 2.5, 3.25});
-  loose.triangles = {loose.triangles[0], loose.triangles[2]};
+  loose.triangles.resize(1);
   writeObj(path_, loose);
   EXPECT_EQ(refusal<DataError>({"--pitch", "0.1,0.1,0.05"}),
-            "the triangles enclose nothing: 6 of their 6 sides meet no other, and their winding "
+            "the triangles enclose nothing: 3 of their 3 sides meet no other, and their winding "
             "number is above one half nowhere; join them in a mesh editor first");
 }
 
