@@ -15,16 +15,27 @@ namespace {
 
 constexpr std::uint32_t leaf_triangles = 4;
 
-/// Where on a triangle a point lies: 0–2 a corner, 3–5 the side from corner n − 3, 6 the face.
-constexpr int face = 6;
+double squaredDistance(const std::array<float, 3>& low, const std::array<float, 3>& high,
+                       const Vec3d& p) {
+  double sum = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double at = p[static_cast<int>(axis)];
+    const double beyond = std::max({low[axis] - at, at - high[axis], 0.0});
+    sum += beyond * beyond;
+  }
+  return sum;
+}
 
-struct OnTriangle {
-  Vec3d point;
-  int where;
-};
+float roundedDown(double value) {
+  const auto rounded = static_cast<float>(value);
+  return rounded <= value ? rounded
+                          : std::nextafter(rounded, -std::numeric_limits<float>::infinity());
+}
+float roundedUp(double value) { return -roundedDown(-value); }
 
-/// The nearest point of a triangle (Ericson: "Real-Time Collision Detection", 2005, 5.1.5).
-OnTriangle nearestOn(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
+}  // namespace
+
+PointOnTriangle nearestOnTriangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
   const Vec3d ab = b - a;
   const Vec3d ac = c - a;
   const Vec3d ap = p - a;
@@ -47,33 +58,13 @@ OnTriangle nearestOn(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d
   if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
     return {b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), 4};
   const double sum = va + vb + vc;
-  return {a + ab * (vb / sum) + ac * (vc / sum), face};
+  return {a + ab * (vb / sum) + ac * (vc / sum), 6};
 }
-
-double squaredDistance(const std::array<float, 3>& low, const std::array<float, 3>& high,
-                       const Vec3d& p) {
-  double sum = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double at = p[static_cast<int>(axis)];
-    const double beyond = std::max({low[axis] - at, at - high[axis], 0.0});
-    sum += beyond * beyond;
-  }
-  return sum;
-}
-
-float roundedDown(double value) {
-  const auto rounded = static_cast<float>(value);
-  return rounded <= value ? rounded
-                          : std::nextafter(rounded, -std::numeric_limits<float>::infinity());
-}
-float roundedUp(double value) { return -roundedDown(-value); }
-
-}  // namespace
 
 struct ClosestPoints::Candidate {
   double squared = std::numeric_limits<double>::infinity();
   std::uint32_t triangle = 0;
-  OnTriangle at{};
+  PointOnTriangle at{};
 };
 
 ClosestPoints::ClosestPoints(Mesh mesh) : mesh_(std::move(mesh)) {
@@ -155,8 +146,8 @@ std::uint32_t ClosestPoints::build(std::uint32_t begin, std::uint32_t end,
 
 void ClosestPoints::consider(std::uint32_t triangle, const Vec3d& p, Candidate& best) const {
   const Mesh::Triangle& t = mesh_.triangles[triangle];
-  const OnTriangle at =
-      nearestOn(mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]], p);
+  const PointOnTriangle at =
+      nearestOnTriangle(mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]], p);
   const double squared = (p - at.point).lengthSqr();
   if (squared < best.squared || (squared == best.squared && triangle < best.triangle))
     best = {squared, triangle, at};
@@ -190,10 +181,11 @@ ClosestPoint ClosestPoints::operator()(const Vec3d& p, std::uint32_t hint) const
   }
 
   const Mesh::Triangle& t = mesh_.triangles[best.triangle];
-  const auto where = static_cast<std::size_t>(best.at.where);
-  const Vec3d& normal = where == face ? normals_[best.triangle]
-                        : where >= 3  ? edge_normals_[3 * std::size_t{best.triangle} + where - 3]
-                                      : vertex_normals_[t[where]];
+  const auto corner = best.at.corner();
+  const auto side = best.at.side();
+  const Vec3d& normal = corner ? vertex_normals_[t[*corner]]
+                        : side ? edge_normals_[3 * std::size_t{best.triangle} + *side]
+                               : normals_[best.triangle];
   const double distance = std::sqrt(best.squared);
   return {normal.dot(p - best.at.point) < 0 ? -distance : distance, best.at.point, best.triangle};
 }

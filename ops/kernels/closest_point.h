@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <openvdb/math/Vec3.h>
@@ -9,6 +11,24 @@
 #include "vdbdither/mesh.h"
 
 namespace vdbdither {
+
+/// The nearest point of a triangle to a given one.
+struct PointOnTriangle {
+  openvdb::Vec3d point;
+  int where;  ///< 0–2: a corner; 3–5: the side from corner n − 3; 6: the face
+
+  [[nodiscard]] std::optional<std::size_t> corner() const {
+    return where < 3 ? std::optional(static_cast<std::size_t>(where)) : std::nullopt;
+  }
+  [[nodiscard]] std::optional<std::size_t> side() const {
+    return where >= 3 && where < 6 ? std::optional(static_cast<std::size_t>(where - 3))
+                                   : std::nullopt;
+  }
+};
+
+/// That of the triangle a, b, c to p (Ericson: "Real-Time Collision Detection", 2005, 5.1.5).
+PointOnTriangle nearestOnTriangle(const openvdb::Vec3d& a, const openvdb::Vec3d& b,
+                                  const openvdb::Vec3d& c, const openvdb::Vec3d& p);
 
 /// The nearest point of a mesh to a given one.
 struct ClosestPoint {

@@ -29,9 +29,10 @@ constexpr int lanes = 4;
 constexpr Doubles ramp{0, 1, 2, 3};
 constexpr Integers integer_ramp{0, 1, 2, 3};
 
-/// A bound solved for one axis: the axis' offset is at least or at most that of the plane.
+/// A bound solved for one axis: the axis' offset is at least or at most that of the plane. By
+/// `inwards` from there the triangle begins that the bound is a side of.
 struct Limit {
-  double x, y, constant;
+  double x, y, constant, inwards;
 };
 
 /// An end of an interval that holds nothing.
@@ -49,6 +50,37 @@ constexpr double nowhere = -1e9;
   } else if (best < 0) {
     high = nowhere;
   }
+}
+
+/// What rounding may take from a form in mm, and more.
+constexpr double rounding_mm = 1e-9;
+
+constexpr std::size_t triangle_sides = 3;
+
+/// The distances, mm, from the voxels of a column at k, k + 1, k + 2, k + 3 to a triangle, infinite
+/// where they are left out, in place of those to its plane, which they are over the triangle.
+[[gnu::always_inline]] inline void measureToTriangle(const LatticeRegion& region, int i, int j,
+                                                     int k, Doubles& distance) {
+  const Doubles infinite = Doubles{} + std::numeric_limits<double>::infinity();
+  Doubles beside = infinite;
+  Doubles outermost = -infinite;
+  for (const LatticeSide& side : region.side) {
+    const LatticeForm& outward = side.outward;
+    const LatticeForm& along = side.along;
+    const Doubles out =
+        ramp * outward.z + (outward.constant + outward.x * i + outward.y * j + outward.z * k);
+    const Doubles at = ramp * along.z + (along.constant + along.x * i + along.y * j + along.z * k);
+    const Doubles over = at - side.length_mm;
+    Doubles past = over > 0 ? over : Doubles{};
+    past = at < 0 ? at : past;
+    const Doubles squared = out * out + past * past;
+    beside = squared < beside ? squared : beside;
+    outermost = out > outermost ? out : outermost;
+  }
+  Doubles far = distance * distance + beside;
+  for (int l = 0; l < lanes; ++l) far[l] = std::sqrt(far[l]);
+  far = beside > region.spread_mm * region.spread_mm ? infinite : far;
+  distance = outermost > 0 ? far : distance;
 }
 
 template <int rank, bool track>
@@ -69,12 +101,15 @@ template <int rank, bool track>
   for (int b = 0; b < region.bounds; ++b) {
     const LatticeForm& form = region.bound[static_cast<std::size_t>(b)];
     constexpr double level = 1e-100;
+    const bool side = rank == 1 && b < static_cast<int>(triangle_sides);
+    const double inwards_mm = side ? region.spread_mm + rounding_mm : 0;
     if (std::abs(form.z) < level) {
-      walls[wall_count++] = {form.x, form.y, form.constant};
+      walls[wall_count++] = {form.x, form.y, form.constant, inwards_mm};
       continue;
     }
     const double inverse = -1 / form.z;
-    const Limit limit{form.x * inverse, form.y * inverse, form.constant * inverse};
+    const Limit limit{form.x * inverse, form.y * inverse, form.constant * inverse,
+                      inwards_mm * std::abs(inverse)};
     if (form.z > 0) {
       floors[floor_count++] = limit;
     } else {
@@ -82,56 +117,66 @@ template <int rank, bool track>
     }
   }
 
-  double i_low = first.x();
-  double i_high = last.x();
-  if (last.x() - first.x() >= few) {
+  double j_low = first.y();
+  double j_high = last.y();
+  if (last.y() - first.y() >= few) {
     for (int b = 0; b < region.bounds; ++b) {
       const LatticeForm& form = region.bound[static_cast<std::size_t>(b)];
       narrow(form,
-             form.constant + std::max(form.y * first.y(), form.y * last.y()) +
+             form.constant + std::max(form.x * first.x(), form.x * last.x()) +
                  std::max(form.z * k_first, form.z * k_last),
-             form.x, i_low, i_high);
+             form.y, j_low, j_high);
     }
-    if (!(i_low <= i_high)) return;
+    if (!(j_low <= j_high)) return;
   }
   const Doubles rise_of_first = ramp * region.distance[0].z;
   const Doubles rise_of_second = ramp * region.distance[1].z;
+  const openvdb::Coord leaf_base = (base >> 3) - leaves.leaves().min();
 
-  for (int i = roundedUp(i_low); i <= roundedDown(i_high); ++i) {
-    double j_low = first.y();
-    double j_high = last.y();
-    if (last.y() - first.y() >= few) {
+  for (int j = roundedUp(j_low); j <= roundedDown(j_high); ++j) {
+    double i_low = first.x();
+    double i_high = last.x();
+    if (last.x() - first.x() >= few) {
       for (int b = 0; b < region.bounds; ++b) {
         const LatticeForm& form = region.bound[static_cast<std::size_t>(b)];
-        narrow(form, form.constant + form.x * i + std::max(form.z * k_first, form.z * k_last),
-               form.y, j_low, j_high);
+        narrow(form, form.constant + form.y * j + std::max(form.z * k_first, form.z * k_last),
+               form.x, i_low, i_high);
       }
-      if (!(j_low <= j_high)) continue;
+      if (!(i_low <= i_high)) continue;
     }
-    const int j_end = roundedDown(j_high) + 1;
+    const int i_end = roundedDown(i_high) + 1;
     std::array<double, LatticeRegion::max_bounds> floor_rows, ceiling_rows;
     for (std::size_t f = 0; f < floor_count; ++f)
-      floor_rows[f] = floors[f].constant + floors[f].x * i;
+      floor_rows[f] = floors[f].constant + floors[f].y * j;
     for (std::size_t c = 0; c < ceiling_count; ++c)
-      ceiling_rows[c] = ceilings[c].constant + ceilings[c].x * i;
-    const auto leaf_x = static_cast<std::size_t>(((base.x() + i) >> 3) - leaves.leaves().min().x());
-    for (int j = roundedUp(j_low); j < j_end; j += lanes) {
-      const Doubles columns = ramp + static_cast<double>(j);
+      ceiling_rows[c] = ceilings[c].constant + ceilings[c].y * j;
+    const std::size_t slot_of_row =
+        static_cast<std::size_t>(leaf_base.y() + (j >> 3)) * LeafDistances::depth;
+    for (int i = roundedUp(i_low); i < i_end; i += lanes) {
+      const Doubles columns = ramp + static_cast<double>(i);
       Doubles low = Doubles{} + k_first;
       Doubles high = Doubles{} + k_last;
+      // Of rank 1, where the column is over the triangle.
+      Doubles inner_low = low;
+      Doubles inner_high = high;
       for (std::size_t f = 0; f < floor_count; ++f) {
-        const Doubles at = columns * floors[f].y + floor_rows[f];
+        const Doubles at = columns * floors[f].x + floor_rows[f];
         low = at > low ? at : low;
+        const Doubles inner = at + floors[f].inwards;
+        inner_low = inner > inner_low ? inner : inner_low;
       }
       for (std::size_t c = 0; c < ceiling_count; ++c) {
-        const Doubles at = columns * ceilings[c].y + ceiling_rows[c];
+        const Doubles at = columns * ceilings[c].x + ceiling_rows[c];
         high = at < high ? at : high;
+        const Doubles inner = at - ceilings[c].inwards;
+        inner_high = inner < inner_high ? inner : inner_high;
       }
       for (std::size_t w = 0; w < wall_count; ++w) {
-        const Doubles at = columns * walls[w].y + (walls[w].constant + walls[w].x * i);
+        const Doubles at = columns * walls[w].x + (walls[w].constant + walls[w].y * j);
         high = at < 0 ? Doubles{} + nowhere : high;
+        inner_high = at < walls[w].inwards ? Doubles{} + nowhere : inner_high;
       }
-      high = columns < static_cast<double>(j_end) ? high : Doubles{} + nowhere;
+      high = columns < static_cast<double>(i_end) ? high : Doubles{} + nowhere;
       low = low < k_last + 1 ? low : Doubles{} + (k_last + 1);
       high = high > nowhere ? high : Doubles{} + nowhere;
       // Conversion cuts off fractions, of positive and of negative numbers.
@@ -149,21 +194,23 @@ template <int rank, bool track>
         const int k_begin = begins[lane];
         const int k_end = ends[lane];
         if (k_end < k_begin) continue;
-        const int y = base.y() + j + lane;
+        const int x = i + lane;
+        const double over_low = inner_low[lane];
+        const double over_high = inner_high[lane];
         std::array<double, rank> column;
         for (std::size_t f = 0; f < rank; ++f) {
           const LatticeForm& form = region.distance[f];
-          column[f] = form.constant + form.x * i + form.y * (j + lane);
+          column[f] = form.constant + form.x * x + form.y * j;
         }
         const std::size_t slot =
-            (leaf_x * leaves.stride()) +
-            static_cast<std::size_t>((y >> 3) - leaves.leaves().min().y()) * LeafDistances::depth;
-        const int leaf_base = (base.z() >> 3) - leaves.leaves().min().z();
-        const int row = ((base.x() + i) & 7) * edge * edge + (y & 7) * edge;
+            static_cast<std::size_t>(leaf_base.x() + (x >> 3)) * leaves.stride() + slot_of_row;
+        const int row = (x & 7) * edge * edge + (j & 7) * edge;
         for (int k = k_begin & ~(lanes - 1); k <= k_end; k += lanes) {
           Floats distance;
           if constexpr (rank == 1) {
-            const Doubles form = rise_of_first + (column[0] + region.distance[0].z * k);
+            Doubles form = rise_of_first + (column[0] + region.distance[0].z * k);
+            if (std::max(k, k_begin) < over_low || std::min(k + (lanes - 1), k_end) > over_high)
+              measureToTriangle(region, x, j, k, form);
             distance = __builtin_convertvector(form, Floats);
             reinterpret_cast<Integers&>(distance) &= 0x7fffffff;
           } else {
@@ -178,7 +225,7 @@ template <int rank, bool track>
             for (int l = 0; l < lanes; ++l) squared[l] = std::sqrt(squared[l]);
             distance = __builtin_convertvector(squared, Floats);
           }
-          const std::size_t at = slot + static_cast<std::size_t>(leaf_base + (k >> 3));
+          const std::size_t at = slot + static_cast<std::size_t>(leaf_base.z() + (k >> 3));
           float* leaf = leaves.distances(at);
           if (leaf == nullptr) leaf = leaves.make(at);
           const int offset = row + (k & 7);

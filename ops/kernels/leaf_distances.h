@@ -93,16 +93,27 @@ struct LatticeForm {
   double x, y, z, constant;
 };
 
+/// A side of a triangle, for the distance to it within the triangle's plane.
+struct LatticeSide {
+  LatticeForm outward, along;  ///< in mm, from the side's beginning
+  double length_mm;
+};
+
 /// What a feature gives to the voxels of its region.
 struct LatticeRegion {
   static constexpr int max_bounds = 20;
 
-  openvdb::Coord base;       ///< where offsets begin; z a multiple of 8
+  openvdb::Coord base;       ///< where offsets begin, multiples of 8
   openvdb::CoordBBox reach;  ///< the voxels looked at, all of them in the leaves at hand
   int rank;                  ///< the distance is the root of the sum of so many squared forms
   int bounds;                ///< voxels where one of so many forms is below zero are left out
   std::array<LatticeForm, 3> distance;  ///< in mm
+  /// Of rank 1 the first three are those of `side`, each `spread_mm` further out.
   std::array<LatticeForm, max_bounds> bound;
+  /// Of rank 1, which is a triangle: beyond its sides the distance is that to the triangle itself;
+  /// further than `spread_mm` beyond them voxels are left out.
+  std::array<LatticeSide, 3> side;
+  double spread_mm;
 };
 
 /// The leaves between two planes, a box of them at most.

@@ -380,8 +380,8 @@ void MeshDistance::Block::lower(MeshFeatures::Id id, double band_mm) {
   const MeshFeature feature = all_.describe(id);
   if (feature.rank == 0) return;
   LatticeRegion region;
-  region.reach =
-      reachOf(feature.min - feature.below * band_mm, feature.max + feature.above * band_mm);
+  region.reach = reachOf(feature.min - feature.below * band_mm - feature.spread_mm,
+                         feature.max + feature.above * band_mm + feature.spread_mm);
   if (region.reach.empty()) return;
   // The base must not depend on the block or the band, for rounding does on it.
   region.base = roundedDownAll(feature.min * per_mm_) & ~(edge - 1);
@@ -393,6 +393,11 @@ void MeshDistance::Block::lower(MeshFeatures::Id id, double band_mm) {
   for (; bounds < static_cast<std::size_t>(feature.bounds); ++bounds)
     region.bound[bounds] = onLattice(feature.bound[bounds], pitch_mm_, base_mm);
   if (feature.rank == 1) {
+    for (std::size_t s = 0; s < region.side.size(); ++s)
+      region.side[s] = {onLattice(feature.side[s].outward, pitch_mm_, base_mm),
+                        onLattice(feature.side[s].along, pitch_mm_, base_mm),
+                        feature.side[s].length_mm};
+    region.spread_mm = feature.spread_mm;
     region.bound[bounds++] = within(region.distance[0], band_mm, 1);
     region.bound[bounds++] = within(region.distance[0], band_mm, -1);
   }
@@ -510,11 +515,10 @@ void MeshDistance::Block::addExtras(Leaf& leaf, const std::uint32_t* names) cons
   for (auto it = leaf.surface->cbeginValueOn(); it; ++it) {
     const openvdb::Index v = it.pos();
     const MeshFeatures::Id id(names[v]);
-    const std::uint32_t triangle = all_.triangleOf(id);
+    const auto [away, triangle] = all_.nearest(id, it.getCoord().asVec3d() * pitch_mm_);
     if (leaf.closest)
       leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(all_.original(triangle));
     if (!leaf.normals) continue;
-    const Vec3d away = all_.away(id, it.getCoord().asVec3d() * pitch_mm_);
     const double distance = away.length();
     const Vec3d normal =
         distance < on_surface_mm ? all_.normal(triangle) : away / (*it < 0 ? -distance : distance);
@@ -548,9 +552,11 @@ MeshDistance::MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band,
                 lattice.pitch_mm.y() * leaf_layers * block_rows,
                 band.greatestMm(lattice.pitch_mm)) {
   if (band_.mm > 0) return;
-  for (const Vec3d& least : features_.leastNormals())
-    triangle_band_mm_.push_back(
-        static_cast<float>(bandAcross(least, lattice_.pitch_mm) * band_.diameters));
+  triangle_band_mm_.resize(features_.triangles());
+  tbb::parallel_for(std::uint32_t{0}, features_.triangles(), [&](std::uint32_t t) {
+    triangle_band_mm_[t] = static_cast<float>(
+        bandAcross(features_.leastNormal(t), lattice_.pitch_mm) * band_.diameters);
+  });
   for (const float band_mm : triangle_band_mm_) widest_mm_ = std::max(widest_mm_, double{band_mm});
 }
 

@@ -15,6 +15,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "ops/kernels/closest_point.h"
+
 namespace vdbdither {
 
 using openvdb::Vec3d;
@@ -27,6 +29,10 @@ constexpr double slack_mm = 1e-7;
 
 /// Triangles lower than this are told by their edges alone.
 constexpr double least_height_mm = 1e-7;
+
+/// The most that the surface may bend at an edge or a vertex which faces answer for.
+constexpr double greatest_bend = 0.1;
+constexpr double abrupt = 2;
 
 constexpr std::uint32_t block_size = 256;
 
@@ -43,11 +49,17 @@ LinearForm halfSpace(const Vec3d& gradient, const Vec3d& point) {
   return {gradient, slack_mm * manhattanLength(gradient) - gradient.dot(point)};
 }
 
-/// Unit normal from the longest side and the height on it, which stays accurate for slivers.
+/// Unit normal, of slivers from the longest side and the height on it, which stays accurate.
 Vec3d faceNormal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   std::array<Vec3d, 3> corners{a, b, c};
   const std::array<double, 3> lengths{(b - a).lengthSqr(), (c - b).lengthSqr(),
                                       (a - c).lengthSqr()};
+  const double longest = *std::max_element(lengths.begin(), lengths.end());
+  const Vec3d twice_area = (b - a).cross(c - a);
+  const double squared = twice_area.lengthSqr();
+  constexpr double sliver = 1e-6;
+  if (squared > sliver * longest * longest && longest > sliver)
+    return twice_area / std::sqrt(squared);
   std::rotate(
       corners.begin(),
       corners.begin() + (std::max_element(lengths.begin(), lengths.end()) - lengths.begin()),
@@ -78,10 +90,12 @@ Vec3d componentMax(const Vec3d& a, const Vec3d& b) { return openvdb::math::maxCo
 
 MeshFeatures::MeshFeatures(const Mesh& mesh, const SwallowedWalls& walls, const Vec3d& origin_mm,
                            double layer_mm, double row_mm, double greatest_mm)
-    : mesh_(sorted(mesh, walls, origin_mm, layer_mm, row_mm)), edges_(mesh_, features_) {
+    : mesh_(sorted(mesh, walls, origin_mm, layer_mm, row_mm)),
+      edges_(mesh_, features_),
+      greatest_mm_(greatest_mm) {
   findNormals();
   findNeighbours();
-  findOwned(greatest_mm);
+  findOwned();
   findBlocks();
 }
 
@@ -91,7 +105,7 @@ double MeshFeatures::memoryBytes() const {
   };
   return bytes(mesh_.vertices) + bytes(mesh_.triangles) + bytes(normals_) + edges_.memoryBytes() +
          bytes(first_edge_) + bytes(vertex_edges_) + bytes(side_edges_) + bytes(owned_) +
-         bytes(original_) + bytes(blocks_);
+         bytes(bend_) + bytes(original_) + bytes(blocks_);
 }
 
 void MeshFeatures::findNormals() {
@@ -118,38 +132,86 @@ void MeshFeatures::findNeighbours() {
   }
 }
 
-/// Whether the wedge beyond the faces of an edge is too thin to matter.
-bool MeshFeatures::isFlat(std::uint32_t edge, double greatest_mm) const {
+/// The sine of half the angle between the two faces at an edge; `abrupt` where there are others.
+///
+/// A point nearest to the edge lies in a direction between the faces' normals, and this is the most
+/// that the nearer of them differs from it.
+double MeshFeatures::bendAtEdge(std::uint32_t edge) const {
   const auto halves = edges_.halves(edge);
-  if (halves.size() != 2) return false;
+  if (halves.size() != 2) return abrupt;
   const auto start = [&](std::size_t i) { return mesh_.triangles[halves[i] / 3][halves[i] % 3]; };
-  if (start(0) == start(1)) return false;
   const Vec3d& a = normals_[halves[0] / 3];
   const Vec3d& b = normals_[halves[1] / 3];
-  return a.dot(b) > 0 && a.cross(b).length() * greatest_mm < slack_mm;
+  if (start(0) == start(1) || !(a.dot(b) > 0)) return abrupt;
+  return 0.5 * (a - b).length();
 }
 
-void MeshFeatures::findOwned(double greatest_mm) {
-  side_edges_.assign(3 * mesh_.triangles.size(), 0);
-  owned_.assign(mesh_.triangles.size(), 0);
-  std::vector<bool> flat(edges_.size());
-  for (std::uint32_t e = 0; e < edges_.size(); ++e) {
+/// The same of a vertex with faces all around it.
+///
+/// Let their normals n differ from their mean N by an angle of at most φ, so that seen along N the
+/// surface at the vertex is a function f with the faces' gradients. A point nearest to the vertex
+/// lies in the direction (−r, 1) of a plane that bounds it, r · x ≥ f(x) for all x, or in that of
+/// one from below. Were r not between the gradients, some x would have g · x > r · x for all of
+/// them, and so f(x) > r · x. So the direction is a sum of normals, u = s Σ λ n with s ≤ 1 / cos φ:
+/// were it further than φ from all of them, u · u = s Σ λ n · u would come to less than 1.
+double MeshFeatures::bendAtVertex(std::uint32_t vertex, const std::vector<float>& at_edge) const {
+  const std::span around(vertex_edges_.data() + first_edge_[vertex],
+                         first_edge_[vertex + 1] - first_edge_[vertex]);
+  Vec3d mean(0, 0, 0);
+  // Every edge is the beginning of one face's corner at the vertex.
+  const auto normalAfter = [&](std::uint32_t edge) -> const Vec3d& {
+    const auto halves = edges_.halves(edge);
+    const bool first = mesh_.triangles[halves[0] / 3][halves[0] % 3] == vertex;
+    return normals_[halves[first ? 0 : 1] / 3];
+  };
+  for (const std::uint32_t edge : around) {
+    if (at_edge[edge] > greatest_bend) return abrupt;
+    mean += normalAfter(edge);
+  }
+  if (!mean.normalize()) return abrupt;
+  double cosine = 1;
+  for (const std::uint32_t edge : around) cosine = std::min(cosine, normalAfter(edge).dot(mean));
+  return cosine > 0 ? std::sqrt(std::max(0.0, 1 - cosine * cosine)) : abrupt;
+}
+
+/// Gives every triangle the edges and vertices that it answers for, and its share of the rest.
+void MeshFeatures::findOwned() {
+  const auto vertices = static_cast<std::uint32_t>(mesh_.vertices.size());
+  const auto triangles = static_cast<std::uint32_t>(mesh_.triangles.size());
+  std::vector<float> at_edge(edges_.size());
+  std::vector<float> at_vertex(vertices);
+  std::vector<std::uint32_t> owner(vertices, std::numeric_limits<std::uint32_t>::max());
+  side_edges_.assign(std::size_t{3} * triangles, 0);
+  owned_.assign(triangles, 0);
+  bend_.assign(triangles, 0);
+  tbb::parallel_for(std::uint32_t{0}, edges_.size(), [&](std::uint32_t e) {
     for (const std::uint32_t half : edges_.halves(e)) side_edges_[half] = e;
-    flat[e] = isFlat(e, greatest_mm);
-    const std::uint32_t owner = edges_.halves(e).front();
-    if (!flat[e]) owned_[owner / 3] |= static_cast<std::uint8_t>(1U << owner % 3);
-  }
-  for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
-    const auto begin = vertex_edges_.begin() + first_edge_[v];
-    const auto end = vertex_edges_.begin() + first_edge_[v + 1];
-    // Also where there is none: at vertices of hidden triangles alone.
-    if (std::all_of(begin, end, [&](std::uint32_t e) { return flat[e]; })) continue;
-    std::uint32_t owner = std::numeric_limits<std::uint32_t>::max();
-    for (auto e = begin; e != end; ++e) owner = std::min(owner, edges_.halves(*e).front() / 3);
-    const Mesh::Triangle& t = mesh_.triangles[owner];
-    owned_[owner] |=
-        static_cast<std::uint8_t>(8U << (std::find(t.begin(), t.end(), v) - t.begin()));
-  }
+    at_edge[e] = static_cast<float>(bendAtEdge(e));
+  });
+  tbb::parallel_for(std::uint32_t{0}, vertices, [&](std::uint32_t v) {
+    at_vertex[v] = static_cast<float>(bendAtVertex(v, at_edge));
+    if (at_vertex[v] <= greatest_bend) return;
+    for (std::uint32_t i = first_edge_[v]; i < first_edge_[v + 1]; ++i)
+      owner[v] = std::min(owner[v], edges_.halves(vertex_edges_[i]).front() / 3);
+  });
+  // Hidden triangles have none.
+  tbb::parallel_for(std::uint32_t{0}, features_, [&](std::uint32_t t) {
+    const auto look = [&](float bend, bool first, unsigned bit) {
+      if (bend <= greatest_bend) {
+        bend_[t] = std::max(bend_[t], bend);
+      } else if (first) {
+        owned_[t] |= static_cast<std::uint8_t>(1U << bit);
+      }
+    };
+    for (unsigned side = 0; side < 3; ++side) {
+      const std::uint32_t v = mesh_.triangles[t][side];
+      look(at_vertex[v], owner[v] == t, side + 3);
+      if (v == mesh_.triangles[t][(side + 1) % 3]) continue;
+      const std::uint32_t half = 3 * t + side;
+      const std::uint32_t edge = side_edges_[half];
+      look(at_edge[edge], edges_.halves(edge).front() == half, side);
+    }
+  });
 }
 
 /// The mesh with its triangles in order and its vertices as they first occur in them, so that what
@@ -274,10 +336,17 @@ MeshFeature MeshFeatures::describeFace(std::uint32_t triangle) const {
   face.rank = 1;
   face.bounds = 3;
   face.distance[0] = formThrough(n, corner(triangle, 0));
+  // Of every distance asked for, so that no voxel's lot depends on the block it is made in.
+  face.spread_mm = slack_mm + greatest_mm_ * double{bend_[triangle]};
   for (int side = 0; side < 3; ++side) {
     const Vec3d& a = corner(triangle, side);
-    const Vec3d& b = corner(triangle, (side + 1) % 3);
-    face.bound[static_cast<std::size_t>(side)] = halfSpace(n.cross(b - a), a);
+    Vec3d along = corner(triangle, (side + 1) % 3) - a;
+    const double length_mm = along.length();
+    along /= length_mm;
+    const Vec3d outward = along.cross(n);
+    const auto s = static_cast<std::size_t>(side);
+    face.side[s] = {formThrough(outward, a), formThrough(along, a), length_mm};
+    face.bound[s] = {-outward, face.spread_mm - face.side[s].outward.constant};
   }
   return face;
 }
@@ -356,55 +425,60 @@ MeshFeature MeshFeatures::describeVertex(std::uint32_t index) const {
   return feature;
 }
 
-Vec3d MeshFeatures::away(Id id, const Vec3d& p) const {
-  switch (id.kind()) {
-    case Kind::face: {
-      const Vec3d& n = normals_[id.index()];
-      return n * n.dot(p - corner(id.index(), 0));
-    }
-    case Kind::edge: {
-      const Vec3d& a = mesh_.vertices[edges_[id.index()].from];
-      const Vec3d along = mesh_.vertices[edges_[id.index()].to] - a;
-      return p - a - along * (along.dot(p - a) / along.lengthSqr());
-    }
-    case Kind::vertex:
-      return p - mesh_.vertices[id.index()];
-  }
-  return {0, 0, 0};
+MeshFeatures::Nearest MeshFeatures::nearest(Id id, const Vec3d& p) const {
+  const auto atVertex = [&](std::uint32_t vertex) {
+    return Nearest{p - mesh_.vertices[vertex], lowestAtVertex(vertex)};
+  };
+  const auto atEdge = [&](std::uint32_t edge) {
+    const Vec3d& a = mesh_.vertices[edges_[edge].from];
+    const Vec3d along = mesh_.vertices[edges_[edge].to] - a;
+    return Nearest{p - a - along * (along.dot(p - a) / along.lengthSqr()), lowestAtEdge(edge)};
+  };
+  if (id.kind() == Kind::vertex) return atVertex(id.index());
+  if (id.kind() == Kind::edge) return atEdge(id.index());
+  const std::uint32_t triangle = id.index();
+  const PointOnTriangle at =
+      nearestOnTriangle(corner(triangle, 0), corner(triangle, 1), corner(triangle, 2), p);
+  if (at.corner()) return atVertex(mesh_.triangles[triangle][*at.corner()]);
+  if (at.side()) return atEdge(side_edges_[3 * triangle + *at.side()]);
+  const Vec3d& n = normals_[triangle];
+  return {n * n.dot(p - corner(triangle, 0)), triangle};
 }
 
-std::vector<Vec3d> MeshFeatures::leastNormals() const {
-  std::vector<Vec3d> least(normals_.size());
-  std::transform(normals_.begin(), normals_.end(), least.begin(), magnitudes);
-  for (std::uint32_t e = 0; e < edges_.size(); ++e) {
-    const auto halves = edges_.halves(e);
-    Vec3d across(0, 0, 0);  // unknown at borders and where more than two faces meet
-    if (halves.size() == 2) {
-      const auto start = [&](std::size_t i) {
-        return mesh_.triangles[halves[i] / 3][halves[i] % 3];
-      };
-      const Vec3d& a = normals_[halves[0] / 3];
-      const Vec3d b = normals_[halves[1] / 3] * (start(0) == start(1) ? -1.0 : 1.0);
-      for (int axis = 0; axis < 3; ++axis)
-        if (a[axis] * b[axis] > 0) across[axis] = std::min(std::abs(a[axis]), std::abs(b[axis]));
+Vec3d MeshFeatures::leastNormal(std::uint32_t triangle) const {
+  const Vec3d& normal = normals_[triangle];
+  Vec3d least = magnitudes(normal);
+  if (!hasFeatures(triangle)) return least;
+  const Mesh::Triangle& corners = mesh_.triangles[triangle];
+  for (std::uint32_t side = 0; side < 3; ++side) {
+    if (corners[side] == corners[(side + 1) % 3]) continue;
+    const std::uint32_t half = 3 * triangle + side;
+    const auto halves = edges_.halves(side_edges_[half]);
+    // Unknown at borders and where more than two faces meet.
+    if (halves.size() != 2) return {0, 0, 0};
+    const std::uint32_t other = halves[halves[0] == half ? 1 : 0];
+    const bool turned = mesh_.triangles[other / 3][other % 3] == corners[side];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double across = turned ? -normals_[other / 3][axis] : normals_[other / 3][axis];
+      least[axis] = normal[axis] * across > 0 ? std::min(least[axis], std::abs(across)) : 0;
     }
-    for (const std::uint32_t half : halves) least[half / 3] = componentMin(least[half / 3], across);
   }
   return least;
 }
 
-std::uint32_t MeshFeatures::triangleOf(Id id) const {
-  if (id.kind() == Kind::face) return id.index();
-  std::uint32_t lowest = std::numeric_limits<std::uint32_t>::max();
-  const auto look = [&](std::uint32_t edge) {
-    for (const std::uint32_t half : edges_.halves(edge))
-      if (lowest > original_.size() || original_[half / 3] < original_[lowest]) lowest = half / 3;
-  };
-  if (id.kind() == Kind::edge) {
-    look(id.index());
-  } else {
-    for (std::uint32_t i = first_edge_[id.index()]; i < first_edge_[id.index() + 1]; ++i)
-      look(vertex_edges_[i]);
+/// Of the triangles at an edge the one that comes first in the mesh given.
+std::uint32_t MeshFeatures::lowestAtEdge(std::uint32_t edge) const {
+  const auto halves = edges_.halves(edge);
+  return *std::min_element(halves.begin(), halves.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return original_[a / 3] < original_[b / 3];
+  }) / 3;
+}
+
+std::uint32_t MeshFeatures::lowestAtVertex(std::uint32_t vertex) const {
+  std::uint32_t lowest = lowestAtEdge(vertex_edges_[first_edge_[vertex]]);
+  for (std::uint32_t i = first_edge_[vertex] + 1; i < first_edge_[vertex + 1]; ++i) {
+    const std::uint32_t other = lowestAtEdge(vertex_edges_[i]);
+    if (original_[other] < original_[lowest]) lowest = other;
   }
   return lowest;
 }

@@ -36,6 +36,15 @@ struct MeshFeature {
   /// Where it has one, a form in mm that is nowhere in the region above the distance.
   LinearForm cap;
   bool capped = false;
+  /// A side of a face: how far a point of its plane is beyond it and along it, mm.
+  struct Side {
+    LinearForm outward, along;
+    double length_mm;
+  };
+  /// Of a face, the first three bounds being the sides'. It answers for its smooth edges and
+  /// corners too: its region reaches `spread_mm` beyond its sides.
+  std::array<Side, 3> side;
+  double spread_mm = 0;
   openvdb::Vec3d min, max;  ///< bounding box of the feature, mm
   openvdb::Vec3d below,
       above;  ///< the region within distance b lies from min − b·below to max + b·above
@@ -45,7 +54,9 @@ struct MeshFeature {
 /// and vertices that each answers for: every edge and vertex belongs to the first of its triangles.
 ///
 /// Any set of triangles will do. Where triangles share vertices the regions of neighbours hardly
-/// overlap, so that the work of a distance field follows its voxels instead of its triangles.
+/// overlap, so that the work of a distance field follows its voxels instead of its triangles. Edges
+/// and vertices where the surface hardly bends have no region of their own: the points that are
+/// nearest to them lie so little beyond the sides of the faces there that these reach further.
 class MeshFeatures {
  public:
   enum class Kind : std::uint32_t { face, edge, vertex };
@@ -74,6 +85,10 @@ class MeshFeatures {
                double layer_mm, double row_mm, double greatest_mm);
 
   [[nodiscard]] double memoryBytes() const;
+
+  [[nodiscard]] std::uint32_t triangles() const {
+    return static_cast<std::uint32_t>(mesh_.triangles.size());
+  }
 
   /// The triangles that meet the layers [low, high] mm, in order. A triangle's number is its place
   /// in the order.
@@ -119,8 +134,14 @@ class MeshFeatures {
 
   [[nodiscard]] MeshFeature describe(Id id) const;
 
-  /// From the nearest point of the feature's plane, line or point to p.
-  [[nodiscard]] openvdb::Vec3d away(Id id, const openvdb::Vec3d& p) const;
+  /// What lies nearest to a point.
+  struct Nearest {
+    openvdb::Vec3d away;  ///< from there to the point
+    /// Of the triangles that the face, edge or vertex belongs to the one first in the mesh given.
+    std::uint32_t triangle;
+  };
+  /// Of the feature, whose region `p` is in.
+  [[nodiscard]] Nearest nearest(Id id, const openvdb::Vec3d& p) const;
 
   /// Corner `corner` of a triangle, relative to the origin.
   [[nodiscard]] const openvdb::Vec3d& corner(std::uint32_t triangle, int corner) const {
@@ -131,25 +152,25 @@ class MeshFeatures {
     return normals_[triangle];
   }
 
-  /// By triangle: what the components of the normals of its face and of its three edges' wedges
-  /// come to at least.
-  [[nodiscard]] std::vector<openvdb::Vec3d> leastNormals() const;
+  /// What the components of the normals of a triangle's face and of its three edges' wedges come to
+  /// at least.
+  [[nodiscard]] openvdb::Vec3d leastNormal(std::uint32_t triangle) const;
 
   /// The number that a triangle has in the mesh that was given.
   [[nodiscard]] std::uint32_t original(std::uint32_t triangle) const { return original_[triangle]; }
-
-  /// Of the triangles that the feature belongs to the one that comes first in the mesh given.
-  [[nodiscard]] std::uint32_t triangleOf(Id id) const;
 
  private:
   Mesh sorted(const Mesh& mesh, const SwallowedWalls& walls, const openvdb::Vec3d& origin_mm,
               double layer_mm, double row_mm);
   void findNormals();
   void findNeighbours();
-  void findOwned(double greatest_mm);
+  void findOwned();
   void findBlocks();
 
-  [[nodiscard]] bool isFlat(std::uint32_t edge, double greatest_mm) const;
+  [[nodiscard]] double bendAtEdge(std::uint32_t edge) const;
+  [[nodiscard]] double bendAtVertex(std::uint32_t vertex, const std::vector<float>& at_edge) const;
+  [[nodiscard]] std::uint32_t lowestAtEdge(std::uint32_t edge) const;
+  [[nodiscard]] std::uint32_t lowestAtVertex(std::uint32_t vertex) const;
   [[nodiscard]] MeshFeature describeFace(std::uint32_t triangle) const;
   [[nodiscard]] MeshFeature describeEdge(std::uint32_t index) const;
   [[nodiscard]] MeshFeature describeVertex(std::uint32_t index) const;
@@ -165,7 +186,9 @@ class MeshFeatures {
   std::vector<std::uint32_t> vertex_edges_;
   std::vector<std::uint32_t> side_edges_;  ///< by half-edge
   std::vector<std::uint8_t> owned_;        ///< by triangle: bits of its sides, then of its corners
-  std::vector<Extent> blocks_;             ///< of every `block_size` triangles in order
+  double greatest_mm_;
+  std::vector<float> bend_;     ///< by triangle: the most at its smooth edges and corners
+  std::vector<Extent> blocks_;  ///< of every `block_size` triangles in order
 };
 
 }  // namespace vdbdither

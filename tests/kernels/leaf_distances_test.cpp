@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "ops/kernels/closest_point.h"
+
 namespace vdbdither {
 namespace {
 
@@ -20,11 +22,45 @@ CoordBBox voxelsOf(const CoordBBox& box) {
   return {box.min() << 3, (box.max() << 3).offsetBy(leaf_layers - 1)};
 }
 
+using openvdb::Vec3d;
+
+const Vec3d pitch_mm(0.042, 0.084, 0.022);
+
+/// A triangle about the middle of a region, for a region of rank 1; the corners in mm from its
+/// base.
+std::array<Vec3d, 3> randomTriangle(std::mt19937& random, LatticeRegion& region,
+                                    const Vec3d& middle) {
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::array<Vec3d, 3> corners;
+  for (Vec3d& corner : corners) {
+    const Vec3d off(uniform(random), uniform(random), random() % 4 == 0 ? 0 : uniform(random));
+    corner = (middle + off * 0.5 * region.reach.dim().asVec3d()) * pitch_mm;
+  }
+  const auto form = [](const Vec3d& gradient, const Vec3d& point) {
+    return LatticeForm{gradient.x() * pitch_mm.x(), gradient.y() * pitch_mm.y(),
+                       gradient.z() * pitch_mm.z(), -gradient.dot(point)};
+  };
+  const Vec3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).unit();
+  region.distance[0] = form(normal, corners[0]);
+  region.spread_mm = random() % 3 == 0 ? 1e-7 : 0.06 * std::abs(uniform(random));
+  for (std::size_t s = 0; s < 3; ++s) {
+    const Vec3d along = corners[(s + 1) % 3] - corners[s];
+    const Vec3d outward = along.unit().cross(normal);
+    region.side[s] = {form(outward, corners[s]), form(along.unit(), corners[s]), along.length()};
+    const LatticeForm& out = region.side[s].outward;
+    region.bound[s] = {-out.x, -out.y, -out.z, region.spread_mm - out.constant};
+  }
+  return corners;
+}
+
 /// A region of `rank` somewhere in the leaves, bounded by up to six planes of any direction.
-LatticeRegion randomRegion(std::mt19937& random, int rank) {
+struct RandomRegion : LatticeRegion {
+  std::array<Vec3d, 3> corners;  ///< of rank 1, mm from the base
+};
+RandomRegion randomRegion(std::mt19937& random, int rank) {
   std::uniform_real_distribution<double> uniform(-1, 1);
   const CoordBBox voxels = voxelsOf(leaves);
-  LatticeRegion region;
+  RandomRegion region;
   const auto within = [&](int axis) {
     return voxels.min()[axis] +
            static_cast<int>(random() % static_cast<unsigned>(voxels.dim()[axis]));
@@ -48,6 +84,10 @@ LatticeRegion randomRegion(std::mt19937& random, int rank) {
   region.bounds = static_cast<int>(random() % 7);
   for (int b = 0; b < region.bounds; ++b)
     region.bound[static_cast<std::size_t>(b)] = form(0.1 + 0.2 * uniform(random));
+  if (rank == 1) {
+    region.bounds = std::max(region.bounds, 3);
+    region.corners = randomTriangle(random, region, middle);
+  }
   return region;
 }
 
@@ -64,30 +104,44 @@ float distanceAt(const LeafDistances& all, const Coord& ijk) {
 TEST(LeafDistances, ARegionLowersTheVoxelsWithinItsBoundsAndNoOther) {
   std::mt19937 random(3);
   int lowered = 0;
-  for (int i = 0; i < 60; ++i) {
-    const LatticeRegion region = randomRegion(random, 1 + i % 3);
+  int beside = 0;
+  for (int i = 0; i < 120; ++i) {
+    const RandomRegion region = randomRegion(random, 1 + i % 3);
     LeafDistances made;
     made.begin(leaves, false);
     leafKernels().lower(region, 0, false, made);
     for (const Coord& ijk : voxelsOf(leaves)) {
+      const Coord offset = ijk - region.base;
       double least = region.reach.isInside(ijk) ? 1 : -1;
       for (int b = 0; b < region.bounds; ++b)
-        least =
-            std::min(least, valueAt(region.bound[static_cast<std::size_t>(b)], ijk - region.base));
+        least = std::min(least, valueAt(region.bound[static_cast<std::size_t>(b)], offset));
       double squared = 0;
       for (int f = 0; f < region.rank; ++f)
-        squared +=
-            std::pow(valueAt(region.distance[static_cast<std::size_t>(f)], ijk - region.base), 2);
+        squared += std::pow(valueAt(region.distance[static_cast<std::size_t>(f)], offset), 2);
+      bool edge = false;
+      if (region.rank == 1) {
+        const Vec3d p = offset.asVec3d() * pitch_mm;
+        const Vec3d nearest =
+            nearestOnTriangle(region.corners[0], region.corners[1], region.corners[2], p).point;
+        const double off = std::sqrt(std::max(0.0, (nearest - p).lengthSqr() - squared));
+        edge = off > 1e-6;
+        least = std::min(least, region.spread_mm - off);
+        squared = (nearest - p).lengthSqr();
+      }
       const float distance = distanceAt(made, ijk);
-      if (least > 1e-12) {
+      // What a root makes of rounding is more than that of a form.
+      const double rounding = region.rank == 1 ? 2e-7 : 1e-12;
+      if (least > rounding) {
         ASSERT_NEAR(distance, std::sqrt(squared), 1e-7) << ijk;
         ++lowered;
-      } else if (least < -1e-12) {
+        beside += edge ? 1 : 0;
+      } else if (least < -rounding) {
         ASSERT_TRUE(std::isinf(distance)) << ijk;
       }
     }
   }
   EXPECT_GT(lowered, 10000);
+  EXPECT_GT(beside, 1000);
 }
 
 TEST(LeafDistances, WhatIsLookedAtDoesNotChangeABit) {

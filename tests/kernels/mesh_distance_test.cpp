@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -10,6 +11,7 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/global_control.h>
 
+#include "ops/kernels/mesh_features.h"
 #include "ops/kernels/winding_number.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/layers.h"
@@ -146,6 +148,36 @@ TEST_P(OnEveryLattice, DistanceToABoxOnTheLatticeIsExact) {
 
 TEST_P(OnEveryLattice, DistanceToATorusIsExact) {
   expectExactOn(torusMesh({0, 0, 0.4}, 0.4, 0.15, 16));
+}
+
+/// A torus in small triangles whose vertices are a little off, so that it bends every way.
+Mesh roughTorus() {
+  Mesh mesh = torusMesh({0.1, 0, 0.4}, 0.2, 0.08, 84);
+  std::mt19937 random(11);
+  std::normal_distribution<double> off(0, 0.00005);
+  for (Vec3d& v : mesh.vertices) v += Vec3d(off(random), off(random), off(random));
+  return mesh;
+}
+
+TEST_P(OnEveryLattice, DistanceToASurfaceThatHardlyBendsIsExact) { expectExactOn(roughTorus()); }
+
+TEST_P(OnEveryLattice, DistanceToASurfaceThatHardlyBendsButHasHolesIsExact) {
+  Mesh mesh = roughTorus();
+  std::mt19937 random(12);
+  std::erase_if(mesh.triangles, [&](const Mesh::Triangle&) { return random() % 50 == 0; });
+  expectExactOn(mesh, false);
+}
+
+TEST(MeshFeatures, FacesAnswerForWhatHardlyBends) {
+  const Mesh mesh = roughTorus();
+  const MeshFeatures features(mesh, {}, {0, 0, 0}, 0.1, 0.1, 0.1);
+  std::map<MeshFeatures::Kind, std::size_t> count;
+  for (std::uint32_t t = 0; t < features.triangles(); ++t)
+    features.visit(t, [&](MeshFeatures::Id id) { ++count[id.kind()]; });
+  EXPECT_EQ(count[MeshFeatures::Kind::face], mesh.triangles.size());
+  EXPECT_LT(count[MeshFeatures::Kind::vertex], mesh.vertices.size() / 2);
+  EXPECT_GT(count[MeshFeatures::Kind::vertex], 0);
+  EXPECT_LT(count[MeshFeatures::Kind::edge], mesh.triangles.size() / 2);
 }
 
 TEST_P(OnEveryLattice, DistanceToAThinPlateIsExact) {
