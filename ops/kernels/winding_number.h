@@ -32,7 +32,7 @@ class WindingNumber {
   /// Within 0.01 of the exact number, mostly within 0.001.
   [[nodiscard]] double at(const openvdb::Vec3d& p) const { return sum(p, rough_radii); }
 
-  /// Within 0.0005 of the exact number, mostly within 0.00005.
+  /// Within 0.0005 of the exact number, mostly within 0.0001.
   [[nodiscard]] double closelyAt(const openvdb::Vec3d& p) const { return sum(p, close_radii); }
 
   /// On the side of ½, and of −½, on which the exact number is; as near to it as that takes.
@@ -40,8 +40,8 @@ class WindingNumber {
 
  private:
   /// From how many radii a group counts as one.
-  static constexpr double rough_radii = 2.5;
-  static constexpr double close_radii = 5;
+  static constexpr double rough_radii = 2;
+  static constexpr double close_radii = 4;
 
   /// Moments of its triangles' vector areas a about the centre, x being the place of each.
   struct Node {

@@ -593,16 +593,23 @@ Octree::Crossing Octree::crossing(const Edge& edge, const Leaf& leaf) const {
   Coord high_corner = edge.low;
   high_corner[edge.axis] += edge.size;
   const bool high_is_inside = isInside(high_corner);
-  // The first stretch between triangles whose ends differ, or the first triangle whose sides do.
-  Crossing crossing;
-  const auto cross = [&](double t, const Vec3d& normal) {
-    if (crossing.passes++ > 0) return;
-    crossing.at = from + along * std::clamp(t, least, 1 - least);
-    crossing.normal = normal;
+  // Where the sides of a triangle differ, or the ends of a stretch between triangles.
+  struct Pass {
+    double low, high;  ///< one place at a triangle
+    Vec3d normal;
   };
-  const auto crossSmoothly = [&](double low, double high) {
-    const double t = crossing.passes > 0 ? low : smoothCrossing(from, along, low, high);
-    cross(t, crossing.passes > 0 ? Vec3d(0.0) : gradientAt(from + along * t, 0.01 * size_mm));
+  std::vector<Pass> passes;
+  const auto pass = [&](const Pass& next) {
+    // Two that are so near let out, or in, what is no wall.
+    const bool is_sliver =
+        !passes.empty() &&
+        0.5 * (next.low + next.high - passes.back().low - passes.back().high) * size_mm <
+            2 * tolerance_mm_;
+    if (is_sliver) {
+      passes.pop_back();
+    } else {
+      passes.push_back(next);
+    }
   };
   double low = 0;
   bool last = low_is_inside;
@@ -612,12 +619,20 @@ Octree::Crossing Octree::crossing(const Edge& edge, const Leaf& leaf) const {
     const double number = winding_.judgedAt(from + along * (t - beside));
     const bool before = number > 0.5;
     const bool after = number - (pierced[i].normal[edge.axis] > 0 ? 1 : -1) > 0.5;
-    if (before != last) crossSmoothly(low, t - beside);
-    if (before != after) cross(t, pierced[i].normal);
+    if (before != last) pass({low, t - beside, Vec3d(0.0)});
+    if (before != after) pass({t, t, pierced[i].normal});
     low = t + beside;
     last = after;
   }
-  if (last != high_is_inside) crossSmoothly(low, 1);
+  if (last != high_is_inside) pass({low, 1, Vec3d(0.0)});
+  Crossing crossing;
+  if (passes.empty()) return crossing;
+  crossing.passes = static_cast<int>(std::min<std::size_t>(passes.size(), 2));
+  const Pass& first = passes.front();
+  const bool is_smooth = first.high > first.low;
+  const double t = is_smooth ? smoothCrossing(from, along, first.low, first.high) : first.low;
+  crossing.at = from + along * std::clamp(t, least, 1 - least);
+  crossing.normal = is_smooth ? gradientAt(from + along * t, 0.01 * size_mm) : first.normal;
   return crossing;
 }
 
