@@ -38,6 +38,7 @@ void judge(const std::filesystem::path& path, std::size_t samples) {
   oriented.triangles.resize(oriented.triangles.size() - repairs.filling_triangles);
   std::string told;
   const bool is_guess = repairs.areOfLooseTriangles(solid.triangles.size());
+  bool is_turned = false;
   if (is_guess) {
     repairs = {};
     oriented = withoutDuplicates(raw, repairs);
@@ -47,6 +48,7 @@ void judge(const std::filesystem::path& path, std::size_t samples) {
                   surface.cell_mm);
     told = text;
     solid = std::move(surface.mesh);
+    is_turned = surface.turned;
   }
 
   const Vec3d pitch(0.1, 0.2, 0.05);
@@ -61,6 +63,10 @@ void judge(const std::filesystem::path& path, std::size_t samples) {
   const WindingNumber closed_winding(solid);
   const WindingNumber oriented_winding(oriented);
   const WindingNumber raw_winding(raw);
+  const auto isInside = [&](double number) {
+    if (!is_guess) return std::abs(number) > 0.5;
+    return is_turned ? number < -0.5 : number > 0.5;
+  };
   // How many of so many voxels have another sign.
   const auto wrongOf = [&](const std::vector<Coord>& voxels, const WindingNumber& winding) {
     return tbb::parallel_reduce(
@@ -70,8 +76,9 @@ void judge(const std::filesystem::path& path, std::size_t samples) {
           for (std::size_t i = range.begin(); i < range.end(); ++i) {
             const float distance = surface.getValue(voxels[i]);
             if (std::abs(distance) < 1e-6F) continue;  // on the surface
-            wrong +=
-                (std::abs(winding.judgedAt(lattice.position(voxels[i]))) > 0.5) != (distance < 0);
+            const double number = winding.judgedAt(lattice.position(voxels[i]));
+            wrong += (&winding == &closed_winding ? std::abs(number) > 0.5 : isInside(number)) !=
+                     (distance < 0);
           }
           return wrong;
         },
