@@ -10,7 +10,7 @@ namespace vdbdither {
 /// The surface of a solid that triangles hint at.
 struct WindingSurface {
   Mesh mesh;            ///< closed, faces outwards; empty where there is no solid
-  double cell_mm = 0;   ///< the edge of the cells that it was found on
+  double cell_mm = 0;   ///< the edge of the smallest cells that it was found on
   bool turned = false;  ///< the triangles face inwards: what counts is the number below −½
 };
 
@@ -20,11 +20,12 @@ struct WindingSurface {
 /// number is ½. Where the number is below −½ in more than twice the space in which it is above ½,
 /// the triangles are inside out, and all of them are taken the other way round.
 ///
-/// By marching cubes: every side of a triangle is met by exactly one other, in the opposite
-/// direction. Vertices lie within a thousandth of a cell of the set's surface; between them, at
-/// sharp edges and in walls thinner than a cell, it is as true as the cells are fine. What lies
-/// farther from the triangles' bounding box than half its longest side is left out. The same bits
-/// for any number of threads.
+/// By dual contouring of an octree: every side of a triangle is met by as many in the opposite
+/// direction. The cells divide where one vertex does not tell what the surface does, into at most
+/// about `most_leaves`. Walls and gaps thinner than 1/2500 of the longest side may be lost, and so
+/// may what is thinner than a cell where the cells no longer divide. What lies farther from the
+/// triangles' bounding box than half its longest side is left out. The same bits for any number of
+/// threads.
 ///
 /// `triangles` in mm. `progress` is told fractions, from the calling thread.
 WindingSurface windingSurface(const Mesh& triangles,
