@@ -10,6 +10,7 @@
 #include "ops/kernels/mesh_placement.h"
 #include "ops/kernels/mesh_repair.h"
 #include "ops/kernels/part_index.h"
+#include "ops/kernels/winding_surface.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
@@ -24,6 +25,7 @@ using openvdb::Vec3d;
 
 /// `meshes` in one, one after the other.
 Mesh joined(std::vector<Mesh> meshes) {
+  if (meshes.empty()) return {};
   Mesh all = std::move(meshes.front());
   for (auto mesh = meshes.begin() + 1; mesh != meshes.end(); ++mesh) {
     const auto first = static_cast<std::uint32_t>(all.vertices.size());
@@ -70,16 +72,18 @@ class MeshToSdf : public Source {
     Mesh mesh = readMeshes();
     place(mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
     questionSize(mesh, schema);
+    const std::vector<Mesh> parts = closed(mesh);  // which a guess may make larger
     schema.lattice = latticeAround(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
-    planParts(mesh, lattice);
-    const SwallowedWalls walls = repair(mesh);
+    for (const Mesh& part : parts)
+      parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
+    const SwallowedWalls hidden = wallsOf(mesh);
     const auto triangles = static_cast<double>(mesh.triangles.size());
     const std::vector<double> leaves = leavesOfRows(mesh, lattice);
     triangles_per_leaf_ = triangles / leavesAtSurface(mesh, lattice);
     schema.leaves_per_row = *std::max_element(leaves.begin(), leaves.end());
     schema.leaves = std::accumulate(leaves.begin(), leaves.end(), 0.0);
-    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, walls);
+    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, hidden);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
@@ -108,6 +112,10 @@ class MeshToSdf : public Source {
   }
 
  private:
+  struct MeshSize {
+    std::size_t vertices, triangles;
+  };
+
   static Band bandFrom(const std::string& text) {
     const bool diameters = text.find_first_not_of("0123456789.") == std::string::npos;
     const double size = parseLengthMm(text);
@@ -115,18 +123,13 @@ class MeshToSdf : public Source {
     return diameters ? Band{size, 0} : Band{0, size};
   }
 
-  /// Makes the mesh bound a solid and finds what of it is no surface of that.
-  SwallowedWalls repair(Mesh& mesh) const {
-    MeshRepairs repairs;
-    mesh = repaired(std::move(mesh), repairs);
+  /// What of the closed mesh is no surface, with what was repaired told or refused.
+  SwallowedWalls wallsOf(const Mesh& mesh) const {
+    MeshRepairs repairs = repairs_;
     if (mesh.triangles.empty())
       throw DataError("the mesh has no surface: all its triangles are degenerate or cancel");
-    const std::size_t sides = 3 * (mesh.triangles.size() - repairs.filling_triangles);
-    if (2 * repairs.boundary_edges > sides)
-      throw DataError("the triangles enclose nothing: " + std::to_string(repairs.boundary_edges) +
-                      " of their " + std::to_string(sides) +
-                      " sides meet no other; join them in a mesh editor first");
-    SwallowedWalls walls = swallowedWalls(mesh);
+    SwallowedWalls walls;
+    if (!is_guess_) walls = swallowedWalls(mesh);
     repairs.swallowed_triangles = walls.swallowed;
     repairs.cut_triangles = walls.cut;
     const std::vector<std::string> lines = repairs.lines();
@@ -139,35 +142,104 @@ class MeshToSdf : public Source {
     report().count("duplicate_triangles", static_cast<double>(repairs.duplicate_triangles));
     report().count("flipped_triangles", static_cast<double>(repairs.flipped_triangles));
     report().count("turned_parts", static_cast<double>(repairs.turned_parts));
-    report().count("boundary_edges", static_cast<double>(repairs.boundary_edges));
+    report().count("boundary_edges", static_cast<double>(repairs.boundary_edges + loose_edges_));
     report().count("closed_holes", static_cast<double>(repairs.closed_holes));
+    report().count("loose_triangles", static_cast<double>(loose_triangles_));
     report().count("swallowed_triangles", static_cast<double>(repairs.swallowed_triangles));
     report().count("cut_triangles", static_cast<double>(repairs.cut_triangles));
     return walls;
+  }
+
+  /// Makes `mesh` bound a solid: by repair, or where triangles of a file enclose nothing by the
+  /// surface of what they hint at. Of several files also each by itself; what is repaired in them
+  /// is told of the whole.
+  std::vector<Mesh> closed(Mesh& mesh) {
+    std::vector<Mesh> parts;
+    std::vector<Mesh> meshes;
+    std::vector<Mesh> guesses;
+    for (Mesh& part : separated(mesh)) {
+      MeshRepairs repairs;
+      parts.push_back(repaired(part, repairs));
+      if (repairs.areOfLooseTriangles(parts.back().triangles.size())) {
+        parts.back() = guessed(std::move(part), parts.back().triangles.size(), repairs);
+        guesses.push_back(parts.back());
+      } else if (paths_.size() == 1) {
+        repairs_ = repairs;
+        meshes.push_back(std::move(parts.back()));
+      } else {
+        meshes.push_back(std::move(part));
+      }
+    }
+    mesh = joined(std::move(meshes));
+    if (paths_.size() == 1) {
+      parts.clear();
+    } else {
+      mesh = repaired(std::move(mesh), repairs_);
+    }
+    is_guess_ = mesh.triangles.empty() && !guesses.empty();
+    guesses.insert(guesses.begin(), std::move(mesh));
+    mesh = joined(std::move(guesses));
+    return parts;
+  }
+
+  /// The surface of what loose triangles hint at. Repairing them took `closed_triangles` and
+  /// `repairs`.
+  Mesh guessed(Mesh loose, std::size_t closed_triangles, const MeshRepairs& repairs) {
+    const std::string open = std::to_string(repairs.boundary_edges) + " of their " +
+                             std::to_string(3 * (closed_triangles - repairs.filling_triangles)) +
+                             " sides meet no other";
+    if (strict_)
+      throw DataError(
+          "the mesh needs repair, which --strict forbids: the triangles enclose nothing, " + open);
+    if (extras_.closest)
+      throw DataError("the triangles enclose nothing, " + open +
+                      ": the part is guessed, and no point of its surface has a triangle for "
+                      "--closest to name; leave it out");
+    loose_edges_ += repairs.boundary_edges;
+    loose = withoutDuplicates(std::move(loose), repairs_);
+    loose_triangles_ += loose.triangles.size();
+    const WindingSurface surface =
+        windingSurface(loose, [this](double fraction) { report().progress(fraction); });
+    if (surface.mesh.triangles.empty())
+      throw DataError("the triangles enclose nothing: " + open +
+                      ", and their winding number is above one half nowhere; join them in a mesh "
+                      "editor first");
+    report().warn("the triangles enclose nothing, " + open +
+                  ": the part is guessed, as where their winding number is above one half" +
+                  (surface.turned ? ", seen from behind since they face inwards" : "") +
+                  ", on cells down to " + shortestText(std::round(surface.cell_mm * 1e4) / 10) +
+                  " um");
+    report().count("winding_cell_mm", surface.cell_mm);
+    return surface.mesh;
   }
 
   Mesh readMeshes() {
     std::vector<Mesh> meshes;
     for (const std::string& path : paths_) {
       meshes.push_back(readMesh(path, [this](const std::string& text) { report().warn(text); }));
-      triangle_counts_.push_back(meshes.back().triangles.size());
+      sizes_.push_back({meshes.back().vertices.size(), meshes.back().triangles.size()});
     }
     return joined(std::move(meshes));
   }
 
-  /// A field of its own for each file of several. What is repaired in them is told of the whole.
-  void planParts(const Mesh& all, const Lattice& lattice) {
-    if (paths_.size() < 2) return;
-    std::size_t first = 0;
-    for (const std::size_t count : triangle_counts_) {
-      Mesh part{all.vertices, {}};
-      const auto begin = all.triangles.begin() + static_cast<std::ptrdiff_t>(first);
-      part.triangles.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
-      MeshRepairs repairs;
-      part = repaired(std::move(part), repairs);
-      parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
-      first += count;
+  /// What was joined, file by file.
+  [[nodiscard]] std::vector<Mesh> separated(const Mesh& all) const {
+    std::vector<Mesh> meshes;
+    auto vertex = all.vertices.begin();
+    auto triangle = all.triangles.begin();
+    std::uint32_t first = 0;
+    for (const MeshSize& size : sizes_) {
+      const auto vertices = static_cast<std::ptrdiff_t>(size.vertices);
+      const auto triangles = static_cast<std::ptrdiff_t>(size.triangles);
+      Mesh& mesh =
+          meshes.emplace_back(Mesh{{vertex, vertex + vertices}, {triangle, triangle + triangles}});
+      for (Mesh::Triangle& t : mesh.triangles)
+        for (std::uint32_t& v : t) v -= first;
+      vertex += vertices;
+      triangle += triangles;
+      first += static_cast<std::uint32_t>(size.vertices);
     }
+    return meshes;
   }
 
   /// Warns of a part that is hardly meant to be as large or as small as it is.
@@ -308,9 +380,13 @@ class MeshToSdf : public Source {
   Band band_;
   double held_band_mm_ = 0;
   std::unique_ptr<MeshDistance> field_;
-  double triangles_per_leaf_ = 0;             ///< of those that the surface itself meets
-  std::vector<std::size_t> triangle_counts_;  ///< of every file
-  std::vector<MeshDistance> parts_;           ///< of every file, where there are several
+  double triangles_per_leaf_ = 0;  ///< of those that the surface itself meets
+  std::vector<MeshSize> sizes_;    ///< of every file
+  MeshRepairs repairs_;
+  bool is_guess_ = false;  ///< all of it, made from the winding number
+  std::uint64_t loose_triangles_ = 0;
+  std::uint64_t loose_edges_ = 0;
+  std::vector<MeshDistance> parts_;  ///< of every file, where there are several
 };
 
 }  // namespace

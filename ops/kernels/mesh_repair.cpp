@@ -332,4 +332,10 @@ Mesh repaired(Mesh mesh, MeshRepairs& repairs) {
   return mesh;
 }
 
+Mesh withoutDuplicates(Mesh mesh, MeshRepairs& repairs) {
+  weldEqual(mesh, repairs);
+  dropDuplicates(mesh, repairs);
+  return mesh;
+}
+
 }  // namespace vdbdither

@@ -21,6 +21,12 @@ struct MeshRepairs {
   std::uint64_t swallowed_triangles = 0;  ///< left out of the surface: wholly within the solid
   std::uint64_t cut_triangles = 0;        ///< left out in part
 
+  /// Whether more than half of the sides were open: then what fills the holes is a guess at
+  /// nothing. `triangles`: of the repaired mesh.
+  [[nodiscard]] bool areOfLooseTriangles(std::size_t triangles) const {
+    return 2 * boundary_edges > 3 * (triangles - filling_triangles);
+  }
+
   /// One line for each kind that occurred.
   [[nodiscard]] std::vector<std::string> lines() const;
 };
@@ -37,5 +43,9 @@ struct MeshRepairs {
 ///
 /// `mesh` in mm.
 Mesh repaired(Mesh mesh, MeshRepairs& repairs);
+
+/// The first steps of `repaired` alone: vertices at the same position become one, and degenerate
+/// and duplicate triangles go.
+Mesh withoutDuplicates(Mesh mesh, MeshRepairs& repairs);
 
 }  // namespace vdbdither

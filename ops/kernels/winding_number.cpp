@@ -13,21 +13,55 @@ namespace {
 
 constexpr std::uint32_t triangles_per_leaf = 8;
 
-/// From how many radii a group counts as a dipole.
-constexpr double far_radii = 4;
+/// Nearer to ½ than this a number is asked for again, more accurately.
+constexpr double rough_doubt = 0.01;
+constexpr double close_doubt = 0.0005;
 
-}  // namespace
+double fromHalf(double number) { return std::abs(std::abs(number) - 0.5); }
 
-double solidAngle(const std::array<Vec3d, 3>& corners, const Vec3d& p) {
+/// A complex number whose argument is half a triangle's solid angle.
+struct HalfAngle {
+  double re, im;
+};
+HalfAngle halfAngle(const std::array<Vec3d, 3>& corners, const Vec3d& p) {
   const Vec3d a = corners[0] - p;
   const Vec3d b = corners[1] - p;
   const Vec3d c = corners[2] - p;
   const double la = a.length();
   const double lb = b.length();
   const double lc = c.length();
-  const double volume = a.dot(b.cross(c));
-  if (volume == 0) return 0;
-  return 2 * std::atan2(volume, la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  return {la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb, a.dot(b.cross(c))};
+}
+
+/// A sum of half angles: their product and how often its argument passed π.
+class HalfAngleSum {
+ public:
+  void add(const HalfAngle& half) {
+    if (half.im == 0) return;
+    const double size = std::max(std::abs(half.re), std::abs(half.im));
+    const double re = half.re / size;
+    const double im = half.im / size;
+    const double next_re = re_ * re - im_ * im;
+    const double next_im = re_ * im + im_ * re;
+    if (im_ >= 0 && im > 0 && next_im < 0) ++turns_;
+    if (im_ < 0 && im < 0 && next_im >= 0) --turns_;
+    re_ = next_re;
+    im_ = next_im;
+  }
+  [[nodiscard]] double total() const {
+    return std::atan2(im_, re_) + 2 * std::numbers::pi * turns_;
+  }
+
+ private:
+  double re_ = 1, im_ = 0;
+  int turns_ = 0;
+};
+
+}  // namespace
+
+double solidAngle(const std::array<Vec3d, 3>& corners, const Vec3d& p) {
+  const HalfAngle half = halfAngle(corners, p);
+  return half.im == 0 ? 0 : 2 * std::atan2(half.im, half.re);
 }
 
 WindingNumber::WindingNumber(const Mesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) {
@@ -48,8 +82,10 @@ std::array<Vec3d, 3> WindingNumber::corners(std::uint32_t triangle) const {
   return {mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]};
 }
 
-std::uint32_t WindingNumber::build(std::uint32_t begin, std::uint32_t end) {
-  Node node{Vec3d(0, 0, 0), Vec3d(0, 0, 0), 0, begin, end, 0};
+WindingNumber::Node WindingNumber::nodeOf(std::uint32_t begin, std::uint32_t end) const {
+  Node node{};
+  node.begin = begin;
+  node.end = end;
   double weight = 0;
   openvdb::math::BBox<Vec3d> box;
   for (std::uint32_t i = begin; i < end; ++i) {
@@ -61,12 +97,56 @@ std::uint32_t WindingNumber::build(std::uint32_t begin, std::uint32_t end) {
     box.expand(middles_[order_[i]]);
   }
   node.centre = weight > 0 ? node.centre / weight : box.getCenter();
-  for (std::uint32_t i = begin; i < end; ++i)
-    for (const Vec3d& corner : corners(order_[i]))
-      node.radius = std::max(node.radius, (corner - node.centre).length());
+  for (std::uint32_t i = begin; i < end; ++i) {
+    std::array<Vec3d, 3> at = corners(order_[i]);
+    for (Vec3d& corner : at) {
+      corner -= node.centre;
+      node.radius = std::max(node.radius, corner.length());
+    }
+    const Vec3d area = 0.5 * (at[1] - at[0]).cross(at[2] - at[0]);
+    const Vec3d total = at[0] + at[1] + at[2];
+    const Vec3d x = total / 3;
+    for (int axis = 0; axis < 3; ++axis)
+      node.first[static_cast<std::size_t>(axis)] += area[axis] * x[axis];
+    node.first[3] += 0.5 * (area.x() * x.y() + area.y() * x.x());
+    node.first[4] += 0.5 * (area.x() * x.z() + area.z() * x.x());
+    node.first[5] += 0.5 * (area.y() * x.z() + area.z() * x.y());
+    // The mean of x xᵀ over a triangle.
+    const auto mean = [&](int j, int k) {
+      return (at[0][j] * at[0][k] + at[1][j] * at[1][k] + at[2][j] * at[2][k] +
+              total[j] * total[k]) /
+             12;
+    };
+    const double xx = mean(0, 0);
+    const double yy = mean(1, 1);
+    const double zz = mean(2, 2);
+    const double xy = mean(0, 1);
+    const double xz = mean(0, 2);
+    const double yz = mean(1, 2);
+    node.second_trace +=
+        area * (xx + yy + zz) + 2.0 * Vec3d(area.x() * xx + area.y() * xy + area.z() * xz,
+                                            area.x() * xy + area.y() * yy + area.z() * yz,
+                                            area.x() * xz + area.y() * yz + area.z() * zz);
+    node.second[0] += area.x() * xx;
+    node.second[1] += area.y() * yy;
+    node.second[2] += area.z() * zz;
+    node.second[3] += 2 * area.x() * xy + area.y() * xx;
+    node.second[4] += 2 * area.x() * xz + area.z() * xx;
+    node.second[5] += 2 * area.y() * xy + area.x() * yy;
+    node.second[6] += 2 * area.y() * yz + area.z() * yy;
+    node.second[7] += 2 * area.z() * xz + area.x() * zz;
+    node.second[8] += 2 * area.z() * yz + area.y() * zz;
+    node.second[9] += 2 * (area.x() * yz + area.y() * xz + area.z() * xy);
+  }
+  return node;
+}
+
+std::uint32_t WindingNumber::build(std::uint32_t begin, std::uint32_t end) {
   const auto index = static_cast<std::uint32_t>(nodes_.size());
-  nodes_.push_back(node);
+  nodes_.push_back(nodeOf(begin, end));
   if (end - begin <= triangles_per_leaf) return index;
+  openvdb::math::BBox<Vec3d> box;
+  for (std::uint32_t i = begin; i < end; ++i) box.expand(middles_[order_[i]]);
   const auto axis = static_cast<int>(box.maxExtent());
   const std::uint32_t half = begin + (end - begin) / 2;
   std::nth_element(order_.begin() + begin, order_.begin() + half, order_.begin() + end,
@@ -76,8 +156,8 @@ std::uint32_t WindingNumber::build(std::uint32_t begin, std::uint32_t end) {
                      return at_a < at_b || (at_a == at_b && a < b);
                    });
   build(begin, half);
-  const std::uint32_t second = build(half, end);
-  nodes_[index].second = second;
+  const std::uint32_t other = build(half, end);
+  nodes_[index].other = other;
   return index;
 }
 
@@ -87,7 +167,16 @@ double WindingNumber::exactAt(const Vec3d& p) const {
   return sum / (4 * std::numbers::pi);
 }
 
-double WindingNumber::at(const Vec3d& p) const {
+double WindingNumber::judgedAt(const Vec3d& p) const {
+  const double rough = at(p);
+  if (fromHalf(rough) > rough_doubt) return rough;
+  const double close = closelyAt(p);
+  return fromHalf(close) > close_doubt ? close : exactAt(p);
+}
+
+/// Of a group: the field of a dipole, a·r / r³ with r from the point to the group's centre, and
+/// what its first and second derivatives add, contracted with the moments.
+double WindingNumber::sum(const Vec3d& p, double far_radii) const {
   if (nodes_.empty()) return 0;
   double sum = 0;
   std::array<std::uint32_t, 64> waiting;
@@ -96,15 +185,32 @@ double WindingNumber::at(const Vec3d& p) const {
   while (count > 0) {
     const std::uint32_t index = waiting[--count];
     const Node& node = nodes_[index];
-    const Vec3d away = node.centre - p;
-    const double squared = away.lengthSqr();
+    const Vec3d r = node.centre - p;
+    const double squared = r.lengthSqr();
     if (squared > far_radii * far_radii * node.radius * node.radius) {
-      sum += node.area.dot(away) / (squared * std::sqrt(squared));
-    } else if (node.second == 0) {
+      const double x = r.x();
+      const double y = r.y();
+      const double z = r.z();
+      const auto& one = node.first;
+      const auto& two = node.second;
+      const double per_squared = 1 / squared;
+      const double trace = one[0] + one[1] + one[2];
+      const double across = one[0] * x * x + one[1] * y * y + one[2] * z * z +
+                            2 * (one[3] * x * y + one[4] * x * z + one[5] * y * z);
+      const double thrice = x * (x * (two[0] * x + two[3] * y + two[4] * z) + two[9] * y * z) +
+                            y * (y * (two[1] * y + two[5] * x + two[6] * z)) +
+                            z * (z * (two[2] * z + two[7] * x + two[8] * y));
+      sum += (node.area.dot(r) + trace +
+              per_squared *
+                  (-3 * across - 1.5 * node.second_trace.dot(r) + 7.5 * per_squared * thrice)) *
+             per_squared / std::sqrt(squared);
+    } else if (node.other == 0) {
+      HalfAngleSum near;
       for (std::uint32_t i = node.begin; i < node.end; ++i)
-        sum += solidAngle(corners(order_[i]), p);
+        near.add(halfAngle(corners(order_[i]), p));
+      sum += 2 * near.total();
     } else {
-      waiting[count++] = node.second;
+      waiting[count++] = node.other;
       waiting[count++] = index + 1;
     }
   }

@@ -16,6 +16,7 @@
 #include "ops/kernels/mesh_repair.h"
 #include "ops/kernels/swallowed_walls.h"
 #include "ops/kernels/winding_number.h"
+#include "ops/kernels/winding_surface.h"
 
 namespace {
 
@@ -23,13 +24,6 @@ using namespace vdbdither;
 using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::Vec3d;
-
-/// The number from every triangle where the fast one may be on the wrong side of a half.
-double windingAt(const WindingNumber& winding, const Vec3d& p) {
-  constexpr double doubt = 0.05;
-  const double fast = winding.at(p);
-  return std::abs(std::abs(fast) - 0.5) < doubt ? winding.exactAt(p) : fast;
-}
 
 void judge(const std::filesystem::path& path, std::size_t samples) {
   Mesh raw = readMesh(path, {});
@@ -39,23 +33,40 @@ void judge(const std::filesystem::path& path, std::size_t samples) {
   for (Vec3d& v : raw.vertices) v = (v - bounds.min()) * scale;
 
   MeshRepairs repairs;
-  const auto solid = std::make_shared<Mesh>(repaired(raw, repairs));
-  Mesh oriented = *solid;
+  Mesh solid = repaired(raw, repairs);
+  Mesh oriented = solid;
   oriented.triangles.resize(oriented.triangles.size() - repairs.filling_triangles);
+  std::string told;
+  const bool is_guess = repairs.areOfLooseTriangles(solid.triangles.size());
+  bool is_turned = false;
+  if (is_guess) {
+    repairs = {};
+    oriented = withoutDuplicates(raw, repairs);
+    WindingSurface surface = windingSurface(oriented);
+    char text[80];
+    std::snprintf(text, sizeof text, "guessed from the winding number, on cells down to %.2f mm",
+                  surface.cell_mm);
+    told = text;
+    solid = std::move(surface.mesh);
+    is_turned = surface.turned;
+  }
 
   const Vec3d pitch(0.1, 0.2, 0.05);
   const Lattice lattice{
       pitch, Vec3d(0, 0, 0),
       CoordBBox(Coord(-2), Coord::ceil(bounds.extents() * scale / pitch).offsetBy(2))};
-  const SwallowedWalls walls = swallowedWalls(*solid);
+  const SwallowedWalls walls = is_guess ? SwallowedWalls{} : swallowedWalls(solid);
   repairs.swallowed_triangles = walls.swallowed;
   repairs.cut_triangles = walls.cut;
-  const DistanceGrids grids =
-      MeshDistance(*solid, lattice, Band{}, {}, walls).run(lattice.layers());
+  const DistanceGrids grids = MeshDistance(solid, lattice, Band{}, {}, walls).run(lattice.layers());
 
-  const WindingNumber closed_winding(*solid);
+  const WindingNumber closed_winding(solid);
   const WindingNumber oriented_winding(oriented);
   const WindingNumber raw_winding(raw);
+  const auto isInside = [&](double number) {
+    if (!is_guess) return std::abs(number) > 0.5;
+    return is_turned ? number < -0.5 : number > 0.5;
+  };
   // How many of so many voxels have another sign.
   const auto wrongOf = [&](const std::vector<Coord>& voxels, const WindingNumber& winding) {
     return tbb::parallel_reduce(
@@ -65,8 +76,9 @@ void judge(const std::filesystem::path& path, std::size_t samples) {
           for (std::size_t i = range.begin(); i < range.end(); ++i) {
             const float distance = surface.getValue(voxels[i]);
             if (std::abs(distance) < 1e-6F) continue;  // on the surface
-            wrong +=
-                (std::abs(windingAt(winding, lattice.position(voxels[i]))) > 0.5) != (distance < 0);
+            const double number = winding.judgedAt(lattice.position(voxels[i]));
+            wrong += (&winding == &closed_winding ? std::abs(number) > 0.5 : isInside(number)) !=
+                     (distance < 0);
           }
           return wrong;
         },
@@ -95,7 +107,6 @@ void judge(const std::filesystem::path& path, std::size_t samples) {
   const auto share = [&](int wrong) {
     return 100.0 * wrong / static_cast<double>(std::max<std::size_t>(1, inside));
   };
-  std::string told;
   for (const std::string& line : repairs.lines()) told += (told.empty() ? "" : "; ") + line;
   std::printf(
       "| %s | %zu | %.1f %% | %d of %zu | %d of %zu | %d of %zu | %.3f %% | %.3f %% | %s |\n",

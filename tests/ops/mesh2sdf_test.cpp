@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/shapes.h"
+#include "tests/support/told.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/operator.h"
@@ -41,6 +42,7 @@ class Mesh2Sdf : public testing::Test {
 
   Schema plan(std::vector<std::string> arguments) {
     operator_ = mesh2sdf.make();
+    operator_->setReporter(&listener_);
     Options options;
     operator_->declare(options);
     arguments.insert(arguments.begin(), path_);
@@ -67,6 +69,7 @@ class Mesh2Sdf : public testing::Test {
   std::filesystem::path folder_;
   std::string path_;
   std::unique_ptr<Operator> operator_;
+  test::Listener listener_;
 };
 
 TEST_F(Mesh2Sdf, KeepsThePositionOfTheMesh) {
@@ -145,12 +148,67 @@ TEST_F(Mesh2Sdf, RepairsOpenMeshesUnlessStrict) {
             "the mesh needs repair, which --strict forbids: 3 boundary edges and more");
 }
 
-TEST_F(Mesh2Sdf, RefusesTrianglesThatEncloseNothing) {
+/// The triangles of a box, each a little smaller and by itself.
+Mesh looseBox() {
+  const Mesh box = test::boxMesh({1, 2, 3}, {2, 2.5, 3.25});
+  Mesh loose;
+  for (const Mesh::Triangle& t : box.triangles) {
+    const Vec3d middle = (box.vertices[t[0]] + box.vertices[t[1]] + box.vertices[t[2]]) / 3;
+    const auto first = static_cast<std::uint32_t>(loose.vertices.size());
+    for (const std::uint32_t v : t)
+      loose.vertices.push_back(box.vertices[v] + 0.01 * (middle - box.vertices[v]));
+    loose.triangles.push_back({first, first + 1, first + 2});
+  }
+  return loose;
+}
+
+TEST_F(Mesh2Sdf, GuessesThePartOfLooseTrianglesAndSaysSo) {
+  writeObj(path_, looseBox());
+  const Schema schema = plan({"--pitch", "0.1,0.1,0.05"});
+  EXPECT_THAT(listener_.warnings,
+              testing::ElementsAre(testing::MatchesRegex(
+                  "the triangles enclose nothing, 36 of their 36 sides meet no other: the part is "
+                  "guessed, as where their winding number is above one half, on cells down to "
+                  "[0-9.]+ um")));
+  EXPECT_EQ(listener_.counts.at("loose_triangles"), 12);
+  EXPECT_EQ(listener_.counts.at("boundary_edges"), 36);
+  EXPECT_GT(listener_.counts.at("winding_cell_mm"), 0);
+  EXPECT_LT(distanceAt(schema, Coord(15, 22, 62)), 0);
+  EXPECT_NEAR(distanceAt(schema, Coord(15, 22, 65)), 0, 0.01);
+  EXPECT_GT(distanceAt(schema, Coord(15, 22, 66)), 0);
+}
+
+TEST_F(Mesh2Sdf, RefusesLooseTrianglesWhereItMayNotGuess) {
+  writeObj(path_, looseBox());
+  EXPECT_EQ(refusal<DataError>({"--pitch", "0.1,0.1,0.05", "--strict"}),
+            "the mesh needs repair, which --strict forbids: the triangles enclose nothing, 36 of "
+            "their 36 sides meet no other");
+  EXPECT_EQ(refusal<DataError>({"--pitch", "0.1,0.1,0.05", "--closest"}),
+            "the triangles enclose nothing, 36 of their 36 sides meet no other: the part is "
+            "guessed, and no point of its surface has a triangle for --closest to name; leave it "
+            "out");
+}
+
+TEST_F(Mesh2Sdf, RefusesTrianglesThatHintAtNothing) {
   Mesh loose = test::boxMesh({1, 2, 3}, {2, 2.5, 3.25});
-  loose.triangles = {loose.triangles[0], loose.triangles[2]};
+  loose.triangles.resize(1);
   writeObj(path_, loose);
-  EXPECT_THAT(refusal<DataError>({"--pitch", "0.1,0.1,0.05"}),
-              HasSubstr("the triangles enclose nothing: "));
+  EXPECT_EQ(refusal<DataError>({"--pitch", "0.1,0.1,0.05"}),
+            "the triangles enclose nothing: 3 of their 3 sides meet no other, and their winding "
+            "number is above one half nowhere; join them in a mesh editor first");
+}
+
+TEST_F(Mesh2Sdf, GuessesOnlyThoseOfSeveralFilesThatAreLoose) {
+  const std::string beside = (folder_ / "beside.obj").string();
+  writeObj(beside, test::transformed(looseBox(), {0, 0, 0}, {2, 0, 0}));
+  const Schema schema = plan({beside, "--pitch", "0.1,0.1,0.05"});
+  EXPECT_EQ(listener_.warnings.size(), 1U);
+  const Grids grids = source().run(schema.lattice.layers());
+  const auto part = openvdb::gridConstPtrCast<openvdb::Int32Grid>(grids.at("part"));
+  const auto surface = openvdb::gridConstPtrCast<openvdb::FloatGrid>(grids.at("surface"));
+  EXPECT_LT(surface->tree().getValue(Coord(15, 22, 62)), 0);
+  EXPECT_LT(surface->tree().getValue(Coord(35, 22, 62)), 0);
+  EXPECT_NE(part->tree().getValue(Coord(15, 22, 64)), part->tree().getValue(Coord(35, 22, 64)));
 }
 
 TEST_F(Mesh2Sdf, RefusesWhatItCannotMean) {
