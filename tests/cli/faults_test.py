@@ -104,7 +104,8 @@ class FullDisk(ProgramTest):
             self.fill(name, "render", self.inputs / "part.stl", f"disk/{name}", "--pixel", "0.01mm", "--samples", 4, sizes=(8,))
 
     def test_a_mask(self):
-        self.fill("a.vdb", "mask", "--size", 32, "-o", "disk/a.vdb", sizes=(8, 64))
+        frames = subprocess.run([PROGRAM, "mask", "--size", "32"], check=True, timeout=120 * PATIENCE, stdout=subprocess.PIPE).stdout
+        self.fill("a.vdb", "write", "disk/a.vdb", input=frames, sizes=(8, 64))
 
     def test_a_measurement(self):
         measure = ("measure", self.inputs / "print.ply", "--reference", self.inputs / "part.stl")
