@@ -16,9 +16,9 @@ struct Schema {
   /// File metadata by key: `vdbdither:history`, `vdbdither:printer`, `vdbdither:materials`, …
   std::map<std::string, std::string, std::less<>> metadata;
   /// How many leaf nodes the surface crosses in the fullest row of leaves (eight layers); zero
-  /// where unknown. Feeds the estimate of memory only.
+  /// where unknown. Feeds the estimate of memory.
   double leaves_per_row = 0;
-  /// How many it crosses in all; zero where unknown. Feeds the estimate of disk only.
+  /// How many it crosses in all; zero where unknown. Feeds the estimates of disk and time.
   double leaves = 0;
 };
 
