@@ -31,7 +31,7 @@ constexpr double slack_mm = 1e-7;
 constexpr double least_height_mm = 1e-7;
 
 /// The most that the surface may bend at an edge or a vertex which faces answer for.
-constexpr double greatest_bend = 0.1;
+constexpr double greatest_bend = 0.06;
 constexpr double abrupt = 2;
 
 constexpr std::uint32_t block_size = 256;

@@ -152,9 +152,9 @@ TEST_P(OnEveryLattice, DistanceToATorusIsExact) {
 
 /// A torus in small triangles whose vertices are a little off, so that it bends every way.
 Mesh roughTorus() {
-  Mesh mesh = torusMesh({0.1, 0, 0.4}, 0.2, 0.08, 84);
+  Mesh mesh = torusMesh({0.1, 0, 0.4}, 0.12, 0.05, 144);
   std::mt19937 random(11);
-  std::normal_distribution<double> off(0, 0.00005);
+  std::normal_distribution<double> off(0, 0.00002);
   for (Vec3d& v : mesh.vertices) v += Vec3d(off(random), off(random), off(random));
   return mesh;
 }
