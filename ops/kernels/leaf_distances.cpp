@@ -2,7 +2,7 @@
 // operation alike.
 //
 // A region is convex: along z it is one interval. The intervals of four columns are found at once;
-// within them the distance takes no further test.
+// within them the distance takes no further test, but for the few voxels beside a triangle.
 
 #include "ops/kernels/leaf_distances.h"
 
