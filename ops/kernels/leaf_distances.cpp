@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "ops/kernels/row_crossings.h"
@@ -55,8 +56,6 @@ constexpr double nowhere = -1e9;
 /// What rounding may take from a form in mm, and more.
 constexpr double rounding_mm = 1e-9;
 
-constexpr std::size_t triangle_sides = 3;
-
 /// The distances, mm, from the voxels of a column at k, k + 1, k + 2, k + 3 to a triangle, infinite
 /// where they are left out, in place of those to its plane, which they are over the triangle.
 [[gnu::always_inline]] inline void measureToTriangle(const LatticeRegion& region, int i, int j,
@@ -101,7 +100,7 @@ template <int rank, bool track>
   for (int b = 0; b < region.bounds; ++b) {
     const LatticeForm& form = region.bound[static_cast<std::size_t>(b)];
     constexpr double level = 1e-100;
-    const bool side = rank == 1 && b < static_cast<int>(triangle_sides);
+    const bool side = rank == 1 && b < std::ssize(region.side);
     const double inwards_mm = side ? region.spread_mm + rounding_mm : 0;
     if (std::abs(form.z) < level) {
       walls[wall_count++] = {form.x, form.y, form.constant, inwards_mm};

@@ -26,6 +26,7 @@
 #include <tbb/parallel_sort.h>
 
 #include "ops/kernels/marching_cubes.h"
+#include "ops/kernels/surface_error.h"
 #include "ops/kernels/winding_number.h"
 #include "vdbdither/openvdb.h"
 
@@ -526,7 +527,7 @@ Vec3d Octree::gradientAt(const Vec3d& p, double step_mm) const {
 }
 
 /// Where the tangents at crossings meet: the point of least squares, where they say nothing the
-/// middle of the crossings . Within the leaf.
+/// middle of the crossings. Within the leaf.
 Vec3d Octree::meet(const Leaf& leaf, std::span<const Crossing> crossings) const {
   Vec3d middle(0.0);
   for (const Crossing& crossing : crossings) middle += crossing.at;
@@ -697,14 +698,6 @@ Mesh Octree::surface() const {
   return mesh;
 }
 
-double volumeOf(const Mesh& mesh, const Vec3d& about) {
-  double sum = 0;
-  for (const Mesh::Triangle& t : mesh.triangles)
-    sum += (mesh.vertices[t[0]] - about)
-               .dot((mesh.vertices[t[1]] - about).cross(mesh.vertices[t[2]] - about));
-  return sum / 6;
-}
-
 }  // namespace
 
 WindingSurface windingSurface(const Mesh& triangles, const std::function<void(double)>& progress,
@@ -728,7 +721,7 @@ WindingSurface windingSurface(const Mesh& triangles, const std::function<void(do
     const WindingNumber winding(faced);
     Octree coarse(faced, winding, bounds, unit_mm, 0, 0);
     coarse.grow(stretch.part(0.05 * static_cast<double>(turned), 0.05 * (1 + turned)));
-    volumes[turned] = volumeOf(coarse.surface(), bounds.getCenter());
+    volumes[turned] = volumeOf(coarse.surface());
     turn();
   }
   made.turned = volumes[1] > 2 * volumes[0];
