@@ -15,6 +15,7 @@
 #include <tuple>
 #include <utility>
 
+#include "ops/kernels/hole_filling.h"
 #include "ops/kernels/mesh_edges.h"
 #include "ops/kernels/winding_number.h"
 
@@ -242,27 +243,9 @@ void turnInsideOut(Mesh& mesh, const std::vector<std::uint32_t>& part, MeshRepai
   }
 }
 
-void fill(Mesh& mesh, const std::vector<std::uint32_t>& loop) {
-  if (loop.size() == 3) {
-    mesh.triangles.push_back({loop[0], loop[1], loop[2]});
-    return;
-  }
-  Vec3d middle(0, 0, 0);
-  double length = 0;
-  for (std::size_t i = 0; i < loop.size(); ++i) {
-    const Vec3d& a = mesh.vertices[loop[i]];
-    const Vec3d& b = mesh.vertices[loop[(i + 1) % loop.size()]];
-    middle += 0.5 * (a + b) * (b - a).length();
-    length += (b - a).length();
-  }
-  const auto centre = static_cast<std::uint32_t>(mesh.vertices.size());
-  mesh.vertices.push_back(length > 0 ? middle / length : mesh.vertices[loop[0]]);
-  for (std::size_t i = 0; i < loop.size(); ++i)
-    mesh.triangles.push_back({loop[i], loop[(i + 1) % loop.size()], centre});
-}
-
-/// Fills the loops that the borders form, taken apart wherever they touch themselves.
-void closeHoles(Mesh& mesh, MeshRepairs& repairs) {
+/// The loops that the borders form, taken apart wherever they touch themselves.
+std::vector<HoleLoop> holesOf(const Mesh& mesh, MeshRepairs& repairs) {
+  std::vector<HoleLoop> loops;
   std::map<std::uint32_t, std::vector<std::uint32_t>> next;  // against the borders
   for (const Border& border : bordersOf(mesh, MeshEdges(mesh))) {
     repairs.boundary_edges += static_cast<std::uint64_t>(border.count);
@@ -285,16 +268,26 @@ void closeHoles(Mesh& mesh, MeshRepairs& repairs) {
           path.push_back(v);
           continue;
         }
-        const std::vector<std::uint32_t> loop(
-            path.begin() + static_cast<std::ptrdiff_t>(seen->second), path.end());
-        for (const std::uint32_t w : loop)
+        loops.emplace_back(path.begin() + static_cast<std::ptrdiff_t>(seen->second), path.end());
+        for (const std::uint32_t w : loops.back())
           if (w != v) place.erase(w);
         path.resize(seen->second + 1);
-        fill(mesh, loop);
-        ++repairs.closed_holes;
       }
     }
   }
+  return loops;
+}
+
+void closeHoles(Mesh& mesh, MeshRepairs& repairs) {
+  const std::vector<HoleLoop> loops = holesOf(mesh, repairs);
+  const std::size_t given = mesh.triangles.size();
+  if (repairs.areOfLooseTriangles(given)) {
+    fillWithFans(mesh, loops);
+  } else {
+    fillWhereNumberIsHalf(mesh, loops);
+  }
+  repairs.closed_holes += loops.size();
+  repairs.filling_triangles = mesh.triangles.size() - given;
 }
 
 }  // namespace
@@ -326,9 +319,7 @@ Mesh repaired(Mesh mesh, MeshRepairs& repairs) {
   dropDuplicates(mesh, repairs);
   const std::vector<std::uint32_t> part = orient(mesh, repairs);
   turnInsideOut(mesh, part, repairs);
-  const std::size_t given = mesh.triangles.size();
   closeHoles(mesh, repairs);
-  repairs.filling_triangles = mesh.triangles.size() - given;
   return mesh;
 }
 

@@ -1,0 +1,356 @@
+// A filling is blown up like a balloon, outwards where the number is above ½ and inwards where it
+// is below, and cut finer until the middles of its sides need not move. What a corner passes on its
+// way is on the right side afterwards wherever it stops.
+
+#include "ops/kernels/hole_filling.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include <openvdb/math/Vec3.h>
+#include <tbb/parallel_for.h>
+
+#include "ops/kernels/mesh_edges.h"
+#include "ops/kernels/surface_error.h"
+#include "ops/kernels/winding_number.h"
+
+namespace vdbdither {
+
+using openvdb::Vec3d;
+
+namespace {
+
+using Triangle = Mesh::Triangle;
+
+/// Of the solid's volume, what the holes that are too small to be looked at may add up to, were
+/// they filled by half balls; and what the others may miss.
+constexpr double volume_tolerance = 2e-4;
+constexpr int most_rounds = 16;
+constexpr std::size_t most_triangles = 200'000;
+
+double lengthOf(const Mesh& mesh, const HoleLoop& loop) {
+  double length = 0;
+  for (std::size_t i = 0; i < loop.size(); ++i)
+    length += (mesh.vertices[loop[(i + 1) % loop.size()]] - mesh.vertices[loop[i]]).length();
+  return length;
+}
+
+Vec3d middleOf(const Mesh& mesh, const HoleLoop& loop) {
+  Vec3d middle(0, 0, 0);
+  double length = 0;
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    const Vec3d& a = mesh.vertices[loop[i]];
+    const Vec3d& b = mesh.vertices[loop[(i + 1) % loop.size()]];
+    middle += 0.5 * (a + b) * (b - a).length();
+    length += (b - a).length();
+  }
+  return length > 0 ? middle / length : mesh.vertices[loop[0]];
+}
+
+void addFan(Mesh& mesh, const HoleLoop& loop, std::uint32_t centre) {
+  for (std::size_t i = 0; i < loop.size(); ++i)
+    mesh.triangles.push_back({loop[i], loop[(i + 1) % loop.size()], centre});
+}
+
+void fillWithFan(Mesh& mesh, const HoleLoop& loop) {
+  if (loop.size() == 3) {
+    mesh.triangles.push_back({loop[0], loop[1], loop[2]});
+    return;
+  }
+  const Vec3d middle = middleOf(mesh, loop);
+  mesh.vertices.push_back(middle);
+  addFan(mesh, loop, static_cast<std::uint32_t>(mesh.vertices.size() - 1));
+}
+
+Vec3d areaOf(const Mesh& mesh, const Triangle& t) {
+  const Vec3d& a = mesh.vertices[t[0]];
+  return 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
+}
+
+/// Fillings of holes on their way to where the number is ½.
+class Membranes {
+ public:
+  Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops, double miss_mm3);
+
+  /// Returns which of them are better than the fans they began as.
+  std::vector<bool> bend();
+
+  /// Adds the triangles of one to the open mesh.
+  void addTo(Mesh& mesh, std::uint32_t hole) const;
+
+ private:
+  /// A place that a corner may leave along a line.
+  struct Place {
+    Vec3d at, outwards;
+    double reach_mm;
+  };
+  struct Travel {
+    double by_mm = 0;      ///< outwards
+    bool arrived = false;  ///< the number is ½ there, or another part begins
+  };
+
+  [[nodiscard]] Travel travel(const Place& place, const WindingNumber& fillings) const;
+  [[nodiscard]] std::vector<Travel> travels(const std::vector<Place>& places) const;
+  void moveCorners();
+  bool cut();
+  [[nodiscard]] std::vector<double> misses() const;
+
+  WindingNumber number_;
+  Mesh mesh_;                        ///< of the fillings; the loops' corners come first
+  std::vector<std::uint32_t> hole_;  ///< by triangle
+  std::vector<std::uint32_t> open_;  ///< by corner of a loop: the open mesh's vertex
+  std::vector<bool> moves_;          ///< by vertex: has not arrived
+  std::vector<bool> is_new_;         ///< by vertex: it moved since sides were looked at
+  std::size_t holes_;
+  double miss_mm_;  ///< what the middle of a side may be away
+};
+
+Membranes::Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops, double miss_mm3)
+    : number_(open), holes_(loops.size()) {
+  std::vector<HoleLoop> own;
+  for (const HoleLoop* loop : loops) {
+    HoleLoop& corners = own.emplace_back();
+    for (const std::uint32_t v : *loop) {
+      corners.push_back(static_cast<std::uint32_t>(open_.size()));
+      open_.push_back(v);
+      mesh_.vertices.push_back(open.vertices[v]);
+    }
+  }
+  for (std::uint32_t hole = 0; hole < holes_; ++hole) {
+    const Vec3d middle = middleOf(mesh_, own[hole]);
+    mesh_.vertices.push_back(middle);
+    addFan(mesh_, own[hole], static_cast<std::uint32_t>(mesh_.vertices.size() - 1));
+    hole_.resize(mesh_.triangles.size(), hole);
+  }
+  moves_.assign(mesh_.vertices.size(), true);
+  std::fill_n(moves_.begin(), open_.size(), false);
+  is_new_ = moves_;
+  miss_mm_ = miss_mm3 / vdbdither::areaOf(mesh_);
+}
+
+/// Outwards where the number is above ½, until it is not or the solid, with all fillings as they
+/// are, begins again; inwards where it is below, until it is not.
+Membranes::Travel Membranes::travel(const Place& place, const WindingNumber& fillings) const {
+  constexpr int steps = 8;
+  constexpr int halvings = 10;
+  const bool is_inside = number_.closelyAt(place.at) > 0.5;
+  const Vec3d along = (is_inside ? place.reach_mm : -place.reach_mm) * place.outwards;
+  const auto arrives = [&](double t) {
+    const Vec3d p = place.at + along * t;
+    const double number = number_.closelyAt(p);
+    return is_inside ? number <= 0.5 || number + fillings.closelyAt(p) > 0.5 : number >= 0.5;
+  };
+  // On the filling itself its own number is anything.
+  constexpr double least = 1e-3;
+  double low = 0;
+  double high = least;
+  if (is_inside && arrives(least)) return {0, true};
+  int step = 0;
+  do {
+    low = step == 0 ? 0 : high;
+    high = static_cast<double>(++step) / steps;
+  } while (!arrives(high) && step < steps);
+  const bool arrived = arrives(high);
+  for (int halving = 0; arrived && halving < halvings; ++halving) {
+    const double middle = 0.5 * (low + high);
+    (arrives(middle) ? high : low) = middle;
+  }
+  return {(is_inside ? high : -high) * place.reach_mm, arrived};
+}
+
+std::vector<Membranes::Travel> Membranes::travels(const std::vector<Place>& places) const {
+  const WindingNumber fillings(mesh_);
+  std::vector<Travel> made(places.size());
+  tbb::parallel_for(std::size_t{0}, places.size(),
+                    [&](std::size_t i) { made[i] = travel(places[i], fillings); });
+  return made;
+}
+
+void Membranes::moveCorners() {
+  std::vector<Vec3d> normals(mesh_.vertices.size(), Vec3d(0.0));
+  std::vector<double> reaches(mesh_.vertices.size(), 0.0);
+  for (const Triangle& t : mesh_.triangles)
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      normals[t[corner]] += areaOf(mesh_, t);
+      for (std::size_t other = 0; other < 3; ++other) {
+        const double side_mm = (mesh_.vertices[t[other]] - mesh_.vertices[t[corner]]).length();
+        reaches[t[corner]] = std::max(reaches[t[corner]], 0.5 * side_mm);
+      }
+    }
+  std::vector<Place> places;
+  std::vector<std::uint32_t> moving;
+  for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
+    if (!moves_[v]) continue;
+    moving.push_back(v);
+    places.push_back({mesh_.vertices[v], normals[v].unitSafe(), reaches[v]});
+  }
+  const std::vector<Travel> made = travels(places);
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    moves_[moving[i]] = !made[i].arrived;
+    if (std::abs(made[i].by_mm) <= miss_mm_) continue;
+    mesh_.vertices[moving[i]] += made[i].by_mm * places[i].outwards;
+    is_new_[moving[i]] = true;
+  }
+}
+
+/// Cuts the sides whose middle is not where it should be. Returns whether there were any.
+bool Membranes::cut() {
+  const MeshEdges edges(mesh_);
+  std::vector<Place> places;
+  std::vector<std::uint32_t> looked_at;
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    const auto [from, to, first] = edges[e];
+    if (to < open_.size() || !(is_new_[from] || is_new_[to])) continue;
+    Vec3d normal(0.0);
+    for (const std::uint32_t half : edges.halves(e))
+      normal += areaOf(mesh_, mesh_.triangles[half / 3]).unitSafe();
+    const Vec3d side = mesh_.vertices[to] - mesh_.vertices[from];
+    looked_at.push_back(e);
+    places.push_back({mesh_.vertices[from] + 0.5 * side, normal.unitSafe(), 0.5 * side.length()});
+  }
+  is_new_.assign(mesh_.vertices.size(), false);
+  const std::vector<Travel> made = travels(places);
+  constexpr std::uint32_t none = ~std::uint32_t{0};
+  std::vector<std::uint32_t> middle(3 * mesh_.triangles.size(), none);  // by half-edge
+  bool is_cut = false;
+  for (std::size_t i = 0; i < looked_at.size(); ++i) {
+    if (std::abs(made[i].by_mm) <= miss_mm_) continue;
+    is_cut = true;
+    for (const std::uint32_t half : edges.halves(looked_at[i]))
+      middle[half] = static_cast<std::uint32_t>(mesh_.vertices.size());
+    mesh_.vertices.push_back(places[i].at + made[i].by_mm * places[i].outwards);
+    moves_.push_back(!made[i].arrived);
+    is_new_.push_back(true);
+  }
+  std::vector<Triangle> cut;
+  std::vector<std::uint32_t> hole;
+  for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
+    Triangle t = mesh_.triangles[i];
+    Triangle m{middle[3 * i], middle[3 * i + 1], middle[3 * i + 2]};
+    const auto count = std::count_if(m.begin(), m.end(), [](std::uint32_t v) { return v != none; });
+    // Turned so that with one the first side is cut, with two the last is not.
+    for (std::size_t turn = 0; turn < 2; ++turn)
+      if ((count == 1 && m[0] == none) || (count == 2 && m[2] != none)) {
+        std::rotate(t.begin(), t.begin() + 1, t.end());
+        std::rotate(m.begin(), m.begin() + 1, m.end());
+      }
+    if (count == 0) cut.push_back(t);
+    if (count == 1) cut.insert(cut.end(), {{t[0], m[0], t[2]}, {m[0], t[1], t[2]}});
+    if (count == 2) {
+      cut.push_back({m[0], t[1], m[1]});
+      const double one = (mesh_.vertices[m[0]] - mesh_.vertices[t[2]]).lengthSqr();
+      const double other = (mesh_.vertices[m[1]] - mesh_.vertices[t[0]]).lengthSqr();
+      if (one < other) {
+        cut.insert(cut.end(), {{t[0], m[0], t[2]}, {m[0], m[1], t[2]}});
+      } else {
+        cut.insert(cut.end(), {{t[0], m[0], m[1]}, {t[0], m[1], t[2]}});
+      }
+    }
+    if (count == 3)
+      cut.insert(cut.end(),
+                 {{t[0], m[0], m[2]}, {m[0], t[1], m[1]}, {m[1], t[2], m[2]}, {m[0], m[1], m[2]}});
+    hole.resize(cut.size(), hole_[i]);
+  }
+  mesh_.triangles = std::move(cut);
+  hole_ = std::move(hole);
+  return is_cut;
+}
+
+/// By hole, what lies between the filling and where it should be, mm³, as far as triangles see.
+std::vector<double> Membranes::misses() const {
+  std::vector<Place> places;
+  for (const Triangle& t : mesh_.triangles) {
+    const Vec3d area = areaOf(mesh_, t);
+    const Vec3d middle = (mesh_.vertices[t[0]] + mesh_.vertices[t[1]] + mesh_.vertices[t[2]]) / 3;
+    places.push_back({middle, area.unitSafe(), std::sqrt(area.length())});
+  }
+  const std::vector<Travel> made = travels(places);
+  std::vector<double> misses(holes_, 0.0);
+  for (std::size_t i = 0; i < made.size(); ++i)
+    misses[hole_[i]] += std::abs(made[i].by_mm) * areaOf(mesh_, mesh_.triangles[i]).length();
+  return misses;
+}
+
+std::vector<bool> Membranes::bend() {
+  const std::vector<double> before = misses();
+  for (int round = 0; round < most_rounds && mesh_.triangles.size() < most_triangles; ++round) {
+    moveCorners();
+    if (!cut()) break;
+  }
+  const std::vector<double> after = misses();
+  std::vector<bool> better(holes_);
+  for (std::size_t hole = 0; hole < holes_; ++hole) better[hole] = 2 * after[hole] < before[hole];
+  return better;
+}
+
+void Membranes::addTo(Mesh& mesh, std::uint32_t hole) const {
+  constexpr std::uint32_t none = ~std::uint32_t{0};
+  std::vector<std::uint32_t> to = open_;
+  to.resize(mesh_.vertices.size(), none);
+  for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
+    if (hole_[i] != hole) continue;
+    Triangle t = mesh_.triangles[i];
+    for (std::uint32_t& v : t) {
+      if (to[v] == none) {
+        to[v] = static_cast<std::uint32_t>(mesh.vertices.size());
+        mesh.vertices.push_back(mesh_.vertices[v]);
+      }
+      v = to[v];
+    }
+    mesh.triangles.push_back(t);
+  }
+}
+
+}  // namespace
+
+void fillWithFans(Mesh& mesh, std::span<const HoleLoop> loops) {
+  for (const HoleLoop& loop : loops) fillWithFan(mesh, loop);
+}
+
+void fillWhereNumberIsHalf(Mesh& mesh, std::span<const HoleLoop> loops) {
+  Mesh fanned = mesh;
+  fillWithFans(fanned, loops);
+  const double miss_mm3 = volume_tolerance * std::abs(volumeOf(fanned));
+
+  // The smallest are left alone as long as all of them together cannot matter.
+  std::vector<double> half_ball_mm3;
+  for (const HoleLoop& loop : loops) {
+    const double radius_mm = lengthOf(mesh, loop) / (2 * std::numbers::pi);
+    half_ball_mm3.push_back(2 * std::numbers::pi / 3 * radius_mm * radius_mm * radius_mm);
+  }
+  std::vector<std::uint32_t> order(loops.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(half_ball_mm3[a], a) < std::pair(half_ball_mm3[b], b);
+  });
+  std::vector<bool> matters(loops.size(), false);
+  double sum_mm3 = 0;
+  for (const std::uint32_t loop : order) {
+    sum_mm3 += half_ball_mm3[loop];
+    matters[loop] = sum_mm3 > miss_mm3;
+  }
+  std::vector<const HoleLoop*> large;
+  for (std::size_t i = 0; i < loops.size(); ++i)
+    if (matters[i]) large.push_back(&loops[i]);
+  if (large.empty()) {
+    mesh = std::move(fanned);
+    return;
+  }
+  Membranes membranes(mesh, large, miss_mm3);
+  const std::vector<bool> better = membranes.bend();
+  std::uint32_t next = 0;
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    if (matters[i] && better[next]) {
+      membranes.addTo(mesh, next);
+    } else {
+      fillWithFan(mesh, loops[i]);
+    }
+    next += matters[i];
+  }
+}
+
+}  // namespace vdbdither
