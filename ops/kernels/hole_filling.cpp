@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include <openvdb/math/Vec3.h>
@@ -28,9 +30,9 @@ using Triangle = Mesh::Triangle;
 
 /// Of the solid's volume, what the holes that are too small to be looked at may add up to, were
 /// they filled by half balls; and what the others may miss.
-constexpr double volume_tolerance = 2e-4;
-constexpr int most_rounds = 16;
-constexpr std::size_t most_triangles = 200'000;
+constexpr double volume_tolerance = 4e-4;
+constexpr int most_rounds = 10;
+constexpr std::size_t most_triangles = 50'000;
 
 double lengthOf(const Mesh& mesh, const HoleLoop& loop) {
   double length = 0;
@@ -39,7 +41,11 @@ double lengthOf(const Mesh& mesh, const HoleLoop& loop) {
   return length;
 }
 
-Vec3d middleOf(const Mesh& mesh, const HoleLoop& loop) {
+void fillWithFan(Mesh& mesh, const HoleLoop& loop) {
+  if (loop.size() == 3) {
+    mesh.triangles.push_back({loop[0], loop[1], loop[2]});
+    return;
+  }
   Vec3d middle(0, 0, 0);
   double length = 0;
   for (std::size_t i = 0; i < loop.size(); ++i) {
@@ -48,27 +54,49 @@ Vec3d middleOf(const Mesh& mesh, const HoleLoop& loop) {
     middle += 0.5 * (a + b) * (b - a).length();
     length += (b - a).length();
   }
-  return length > 0 ? middle / length : mesh.vertices[loop[0]];
-}
-
-void addFan(Mesh& mesh, const HoleLoop& loop, std::uint32_t centre) {
+  const auto centre = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.push_back(length > 0 ? middle / length : mesh.vertices[loop[0]]);
   for (std::size_t i = 0; i < loop.size(); ++i)
     mesh.triangles.push_back({loop[i], loop[(i + 1) % loop.size()], centre});
-}
-
-void fillWithFan(Mesh& mesh, const HoleLoop& loop) {
-  if (loop.size() == 3) {
-    mesh.triangles.push_back({loop[0], loop[1], loop[2]});
-    return;
-  }
-  const Vec3d middle = middleOf(mesh, loop);
-  mesh.vertices.push_back(middle);
-  addFan(mesh, loop, static_cast<std::uint32_t>(mesh.vertices.size() - 1));
 }
 
 Vec3d areaOf(const Mesh& mesh, const Triangle& t) {
   const Vec3d& a = mesh.vertices[t[0]];
   return 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
+}
+
+/// The triangles between the corners of a loop whose areas add up to the least (Barequet, Sharir:
+/// "Filling gaps in the boundary of a polyhedron", 1995), or a fan where there are too many
+/// corners.
+void fillWithLeastArea(Mesh& mesh, const HoleLoop& loop) {
+  const std::size_t count = loop.size();
+  constexpr std::size_t most_corners = 500;
+  if (count > most_corners) return fillWithFan(mesh, loop);
+  struct Best {
+    double area = 0;
+    std::uint32_t corner = 0;
+  };
+  std::vector<Best> best(count * count);  // of the corners from one to another, which have a side
+  for (std::size_t span = 2; span < count; ++span)
+    for (std::size_t from = 0; from + span < count; ++from) {
+      const std::size_t to = from + span;
+      Best least{std::numeric_limits<double>::infinity()};
+      for (std::size_t corner = from + 1; corner < to; ++corner) {
+        const double area = best[from * count + corner].area + best[corner * count + to].area +
+                            areaOf(mesh, {loop[from], loop[corner], loop[to]}).length();
+        if (area < least.area) least = {area, static_cast<std::uint32_t>(corner)};
+      }
+      best[from * count + to] = least;
+    }
+  std::vector<std::pair<std::size_t, std::size_t>> sides{{0, count - 1}};
+  while (!sides.empty()) {
+    const auto [from, to] = sides.back();
+    sides.pop_back();
+    if (to - from < 2) continue;
+    const std::uint32_t corner = best[from * count + to].corner;
+    mesh.triangles.push_back({loop[from], loop[corner], loop[to]});
+    sides.insert(sides.end(), {{from, corner}, {corner, to}});
+  }
 }
 
 /// Fillings of holes on their way to where the number is ½.
@@ -88,29 +116,32 @@ class Membranes {
     Vec3d at, outwards;
     double reach_mm;
   };
-  struct Travel {
-    double by_mm = 0;      ///< outwards
-    bool arrived = false;  ///< the number is ½ there, or another part begins
+  struct Way {
+    Vec3d by;
+    bool leads_there;  ///< to where a filling should be, and not to a triangle or nowhere
   };
 
-  [[nodiscard]] Travel travel(const Place& place, const WindingNumber& fillings) const;
-  [[nodiscard]] std::vector<Travel> travels(const std::vector<Place>& places) const;
-  void moveCorners();
+  /// The way that a place of a filling should go, within reach.
+  [[nodiscard]] Way way(const Place& place) const;
+  [[nodiscard]] std::vector<Way> ways(const std::vector<Place>& places) const;
   bool cut();
   [[nodiscard]] std::vector<double> misses() const;
 
   WindingNumber number_;
+  Mesh first_;  ///< the fillings before they were bent
+  std::optional<WindingNumber> first_number_;
   Mesh mesh_;                        ///< of the fillings; the loops' corners come first
   std::vector<std::uint32_t> hole_;  ///< by triangle
   std::vector<std::uint32_t> open_;  ///< by corner of a loop: the open mesh's vertex
-  std::vector<bool> moves_;          ///< by vertex: has not arrived
-  std::vector<bool> is_new_;         ///< by vertex: it moved since sides were looked at
+  std::vector<bool> is_new_;         ///< by vertex: no side at it was looked at
   std::size_t holes_;
-  double miss_mm_;  ///< what the middle of a side may be away
+  double miss_mm_;                   ///< what the middle of a side may be away
+  double least_mm3_;                 ///< what is not worth a cut
+  std::vector<double> of_fans_mm3_;  ///< by hole, what lay between a fan and where it should be
 };
 
 Membranes::Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops, double miss_mm3)
-    : number_(open), holes_(loops.size()) {
+    : number_(open), holes_(loops.size()), least_mm3_(miss_mm3 / 1000) {
   std::vector<HoleLoop> own;
   for (const HoleLoop* loop : loops) {
     HoleLoop& corners = own.emplace_back();
@@ -120,81 +151,72 @@ Membranes::Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops
       mesh_.vertices.push_back(open.vertices[v]);
     }
   }
-  for (std::uint32_t hole = 0; hole < holes_; ++hole) {
-    const Vec3d middle = middleOf(mesh_, own[hole]);
-    mesh_.vertices.push_back(middle);
-    addFan(mesh_, own[hole], static_cast<std::uint32_t>(mesh_.vertices.size() - 1));
-    hole_.resize(mesh_.triangles.size(), hole);
-  }
-  moves_.assign(mesh_.vertices.size(), true);
-  std::fill_n(moves_.begin(), open_.size(), false);
-  is_new_ = moves_;
+  const auto fill = [&](const auto& with) {
+    mesh_.triangles.clear();
+    hole_.clear();
+    for (std::uint32_t hole = 0; hole < holes_; ++hole) {
+      with(mesh_, own[hole]);
+      hole_.resize(mesh_.triangles.size(), hole);
+    }
+  };
+  fill(fillWithLeastArea);
+  first_ = mesh_;
+  first_number_.emplace(first_);
   miss_mm_ = miss_mm3 / vdbdither::areaOf(mesh_);
+  fill(fillWithFan);
+  of_fans_mm3_ = misses();
+  mesh_ = first_;
+  fill(fillWithLeastArea);
+  is_new_.assign(mesh_.vertices.size(), true);
 }
 
-/// Outwards where the number is above ½, until it is not or the solid, with all fillings as they
-/// are, begins again; inwards where it is below, until it is not.
-Membranes::Travel Membranes::travel(const Place& place, const WindingNumber& fillings) const {
+/// Outwards where the number is above ½, until it is not or the solid, as the fillings first made
+/// it, begins again; inwards where it is below, until it is not.
+Membranes::Way Membranes::way(const Place& place) const {
   constexpr int steps = 8;
-  constexpr int halvings = 10;
-  const bool is_inside = number_.closelyAt(place.at) > 0.5;
-  const Vec3d along = (is_inside ? place.reach_mm : -place.reach_mm) * place.outwards;
-  const auto arrives = [&](double t) {
+  constexpr int halvings = 8;
+  const double here = number_.closelyAt(place.at) - 0.5;
+  const bool is_inside = here > 0;
+  // Where ½ is near the number itself tells the way to it. Between parts that cover one another's
+  // holes it hardly changes.
+  const Vec3d slope = number_.gradientAt(place.at);
+  const double rise = slope.length();
+  const bool is_near = std::abs(here) < std::min(0.5, place.reach_mm * rise);
+  Vec3d along = is_near ? slope * (-place.reach_mm / rise) : place.outwards * place.reach_mm;
+  if (!is_inside) along = -along;
+  struct Seen {
+    double t, number;
+    bool arrived;
+  };
+  const auto look = [&](double t) {
     const Vec3d p = place.at + along * t;
     const double number = number_.closelyAt(p);
-    return is_inside ? number <= 0.5 || number + fillings.closelyAt(p) > 0.5 : number >= 0.5;
+    const bool is_covered = is_inside && !is_near && number + first_number_->closelyAt(p) > 0.5;
+    return Seen{t, number, (number > 0.5) != is_inside || is_covered};
   };
   // On the filling itself its own number is anything.
-  constexpr double least = 1e-3;
-  double low = 0;
-  double high = least;
-  if (is_inside && arrives(least)) return {0, true};
-  int step = 0;
-  do {
-    low = step == 0 ? 0 : high;
-    high = static_cast<double>(++step) / steps;
-  } while (!arrives(high) && step < steps);
-  const bool arrived = arrives(high);
-  for (int halving = 0; arrived && halving < halvings; ++halving) {
-    const double middle = 0.5 * (low + high);
-    (arrives(middle) ? high : low) = middle;
+  Seen low = look(1e-3);
+  if (low.arrived) return {Vec3d(0.0), true};
+  Seen high = low;
+  for (int step = 1; step <= steps && !high.arrived; ++step) {
+    low = high;
+    high = look(static_cast<double>(step) / steps);
   }
-  return {(is_inside ? high : -high) * place.reach_mm, arrived};
+  if (!high.arrived) return {along, false};
+  for (int halving = 0; halving < halvings; ++halving) {
+    const Seen middle = look(0.5 * (low.t + high.t));
+    (middle.arrived ? high : low) = middle;
+  }
+  const bool is_triangle =
+      (high.number > 0.5) != is_inside && std::abs(high.number - low.number) > 0.5;
+  return {along * high.t, !is_triangle};
 }
 
-std::vector<Membranes::Travel> Membranes::travels(const std::vector<Place>& places) const {
-  const WindingNumber fillings(mesh_);
-  std::vector<Travel> made(places.size());
+std::vector<Membranes::Way> Membranes::ways(const std::vector<Place>& places) const {
+  std::vector<Way> made(places.size());
   tbb::parallel_for(std::size_t{0}, places.size(),
-                    [&](std::size_t i) { made[i] = travel(places[i], fillings); });
+                    [&](std::size_t i) { made[i] = way(places[i]); });
   return made;
-}
-
-void Membranes::moveCorners() {
-  std::vector<Vec3d> normals(mesh_.vertices.size(), Vec3d(0.0));
-  std::vector<double> reaches(mesh_.vertices.size(), 0.0);
-  for (const Triangle& t : mesh_.triangles)
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      normals[t[corner]] += areaOf(mesh_, t);
-      for (std::size_t other = 0; other < 3; ++other) {
-        const double side_mm = (mesh_.vertices[t[other]] - mesh_.vertices[t[corner]]).length();
-        reaches[t[corner]] = std::max(reaches[t[corner]], 0.5 * side_mm);
-      }
-    }
-  std::vector<Place> places;
-  std::vector<std::uint32_t> moving;
-  for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
-    if (!moves_[v]) continue;
-    moving.push_back(v);
-    places.push_back({mesh_.vertices[v], normals[v].unitSafe(), reaches[v]});
-  }
-  const std::vector<Travel> made = travels(places);
-  for (std::size_t i = 0; i < moving.size(); ++i) {
-    moves_[moving[i]] = !made[i].arrived;
-    if (std::abs(made[i].by_mm) <= miss_mm_) continue;
-    mesh_.vertices[moving[i]] += made[i].by_mm * places[i].outwards;
-    is_new_[moving[i]] = true;
-  }
 }
 
 /// Cuts the sides whose middle is not where it should be. Returns whether there were any.
@@ -204,26 +226,30 @@ bool Membranes::cut() {
   std::vector<std::uint32_t> looked_at;
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
     const auto [from, to, first] = edges[e];
-    if (to < open_.size() || !(is_new_[from] || is_new_[to])) continue;
+    if (edges.halves(e).size() != 2 || !(is_new_[from] || is_new_[to])) continue;
     Vec3d normal(0.0);
     for (const std::uint32_t half : edges.halves(e))
       normal += areaOf(mesh_, mesh_.triangles[half / 3]).unitSafe();
     const Vec3d side = mesh_.vertices[to] - mesh_.vertices[from];
     looked_at.push_back(e);
-    places.push_back({mesh_.vertices[from] + 0.5 * side, normal.unitSafe(), 0.5 * side.length()});
+    places.push_back({mesh_.vertices[from] + 0.5 * side, normal.unitSafe(), side.length()});
   }
   is_new_.assign(mesh_.vertices.size(), false);
-  const std::vector<Travel> made = travels(places);
+  const std::vector<Way> made = ways(places);
   constexpr std::uint32_t none = ~std::uint32_t{0};
   std::vector<std::uint32_t> middle(3 * mesh_.triangles.size(), none);  // by half-edge
   bool is_cut = false;
   for (std::size_t i = 0; i < looked_at.size(); ++i) {
-    if (std::abs(made[i].by_mm) <= miss_mm_) continue;
+    double area_mm2 = 0;
+    for (const std::uint32_t half : edges.halves(looked_at[i]))
+      area_mm2 += areaOf(mesh_, mesh_.triangles[half / 3]).length();
+    const double miss_mm = made[i].by.length();
+    if (!made[i].leads_there || miss_mm <= miss_mm_ || miss_mm * area_mm2 < 3 * least_mm3_)
+      continue;
     is_cut = true;
     for (const std::uint32_t half : edges.halves(looked_at[i]))
       middle[half] = static_cast<std::uint32_t>(mesh_.vertices.size());
-    mesh_.vertices.push_back(places[i].at + made[i].by_mm * places[i].outwards);
-    moves_.push_back(!made[i].arrived);
+    mesh_.vertices.push_back(places[i].at + made[i].by);
     is_new_.push_back(true);
   }
   std::vector<Triangle> cut;
@@ -268,22 +294,21 @@ std::vector<double> Membranes::misses() const {
     const Vec3d middle = (mesh_.vertices[t[0]] + mesh_.vertices[t[1]] + mesh_.vertices[t[2]]) / 3;
     places.push_back({middle, area.unitSafe(), std::sqrt(area.length())});
   }
-  const std::vector<Travel> made = travels(places);
+  const std::vector<Way> made = ways(places);
   std::vector<double> misses(holes_, 0.0);
   for (std::size_t i = 0; i < made.size(); ++i)
-    misses[hole_[i]] += std::abs(made[i].by_mm) * areaOf(mesh_, mesh_.triangles[i]).length();
+    misses[hole_[i]] += made[i].by.length() * areaOf(mesh_, mesh_.triangles[i]).length();
   return misses;
 }
 
 std::vector<bool> Membranes::bend() {
-  const std::vector<double> before = misses();
   for (int round = 0; round < most_rounds && mesh_.triangles.size() < most_triangles; ++round) {
-    moveCorners();
     if (!cut()) break;
   }
   const std::vector<double> after = misses();
   std::vector<bool> better(holes_);
-  for (std::size_t hole = 0; hole < holes_; ++hole) better[hole] = 2 * after[hole] < before[hole];
+  for (std::size_t hole = 0; hole < holes_; ++hole)
+    better[hole] = 2 * after[hole] < of_fans_mm3_[hole];
   return better;
 }
 
@@ -331,7 +356,7 @@ void fillWhereNumberIsHalf(Mesh& mesh, std::span<const HoleLoop> loops) {
   double sum_mm3 = 0;
   for (const std::uint32_t loop : order) {
     sum_mm3 += half_ball_mm3[loop];
-    matters[loop] = sum_mm3 > miss_mm3;
+    matters[loop] = sum_mm3 > miss_mm3 && loops[loop].size() > 3;
   }
   std::vector<const HoleLoop*> large;
   for (std::size_t i = 0; i < loops.size(); ++i)

@@ -1,7 +1,5 @@
 // Whatever the triangles are, the sides that nothing meets from the other side form closed loops.
-// Filling these makes the mesh a cycle, for which the winding number is whole. For a flat hole the
-// fan is where the generalized winding number of the open mesh (Jacobson, Kavan, Sorkine-Hornung,
-// "Robust inside-outside segmentation using generalized winding numbers", 2013) is one half.
+// Filling these makes the mesh a cycle, for which the winding number is whole.
 
 #include "ops/kernels/mesh_repair.h"
 

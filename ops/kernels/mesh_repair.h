@@ -38,8 +38,8 @@ struct MeshRepairs {
 /// Vertices at the same position become one (that is not counted as a repair: file formats without
 /// shared vertices need it); at borders also those within a micrometre. Degenerate and duplicate
 /// triangles go. Triangles are turned to agree with their neighbours, parts that are inside out and
-/// in no other part are turned, and loops of borders are filled by a fan. Deterministic; the order
-/// of the triangles that stay is kept.
+/// in no other part are turned, and loops of borders are filled; see hole_filling.h. Deterministic;
+/// the order of the triangles that stay is kept.
 ///
 /// `mesh` in mm.
 Mesh repaired(Mesh mesh, MeshRepairs& repairs);

@@ -174,11 +174,10 @@ double WindingNumber::judgedAt(const Vec3d& p) const {
   return fromHalf(close) > close_doubt ? close : exactAt(p);
 }
 
-/// Of a group: the field of a dipole, a·r / r³ with r from the point to the group's centre, and
-/// what its first and second derivatives add, contracted with the moments.
-double WindingNumber::sum(const Vec3d& p, double far_radii) const {
-  if (nodes_.empty()) return 0;
-  double sum = 0;
+template <class Far, class Near>
+void WindingNumber::forEach(const Vec3d& p, double far_radii, const Far& far,
+                            const Near& near) const {
+  if (nodes_.empty()) return;
   std::array<std::uint32_t, 64> waiting;
   std::size_t count = 0;
   waiting[count++] = 0;
@@ -186,34 +185,92 @@ double WindingNumber::sum(const Vec3d& p, double far_radii) const {
     const std::uint32_t index = waiting[--count];
     const Node& node = nodes_[index];
     const Vec3d r = node.centre - p;
-    const double squared = r.lengthSqr();
-    if (squared > far_radii * far_radii * node.radius * node.radius) {
-      const double x = r.x();
-      const double y = r.y();
-      const double z = r.z();
-      const auto& one = node.first;
-      const auto& two = node.second;
-      const double per_squared = 1 / squared;
-      const double trace = one[0] + one[1] + one[2];
-      const double across = one[0] * x * x + one[1] * y * y + one[2] * z * z +
-                            2 * (one[3] * x * y + one[4] * x * z + one[5] * y * z);
-      const double thrice = x * (x * (two[0] * x + two[3] * y + two[4] * z) + two[9] * y * z) +
-                            y * (y * (two[1] * y + two[5] * x + two[6] * z)) +
-                            z * (z * (two[2] * z + two[7] * x + two[8] * y));
-      sum += (node.area.dot(r) + trace +
-              per_squared *
-                  (-3 * across - 1.5 * node.second_trace.dot(r) + 7.5 * per_squared * thrice)) *
-             per_squared / std::sqrt(squared);
+    if (r.lengthSqr() > far_radii * far_radii * node.radius * node.radius) {
+      far(node, r);
     } else if (node.other == 0) {
-      HalfAngleSum near;
-      for (std::uint32_t i = node.begin; i < node.end; ++i)
-        near.add(halfAngle(corners(order_[i]), p));
-      sum += 2 * near.total();
+      near(node);
     } else {
       waiting[count++] = node.other;
       waiting[count++] = index + 1;
     }
   }
+}
+
+/// Of a group: the field of a dipole, a·r / r³ with r from the point to the group's centre, and
+/// what its first and second derivatives add, contracted with the moments.
+double WindingNumber::sum(const Vec3d& p, double far_radii) const {
+  double sum = 0;
+  const auto far = [&sum](const Node& node, const Vec3d& r) {
+    const double x = r.x();
+    const double y = r.y();
+    const double z = r.z();
+    const auto& one = node.first;
+    const auto& two = node.second;
+    const double squared = r.lengthSqr();
+    const double per_squared = 1 / squared;
+    const double trace = one[0] + one[1] + one[2];
+    const double across = one[0] * x * x + one[1] * y * y + one[2] * z * z +
+                          2 * (one[3] * x * y + one[4] * x * z + one[5] * y * z);
+    const double thrice = x * (x * (two[0] * x + two[3] * y + two[4] * z) + two[9] * y * z) +
+                          y * (y * (two[1] * y + two[5] * x + two[6] * z)) +
+                          z * (z * (two[2] * z + two[7] * x + two[8] * y));
+    sum += (node.area.dot(r) + trace +
+            per_squared *
+                (-3 * across - 1.5 * node.second_trace.dot(r) + 7.5 * per_squared * thrice)) *
+           per_squared / std::sqrt(squared);
+  };
+  const auto near = [&](const Node& node) {
+    HalfAngleSum leaf;
+    for (std::uint32_t i = node.begin; i < node.end; ++i)
+      leaf.add(halfAngle(corners(order_[i]), p));
+    sum += 2 * leaf.total();
+  };
+  forEach(p, far_radii, far, near);
+  return sum / (4 * std::numbers::pi);
+}
+
+/// Of a triangle what its sides add, as currents do to a magnetic field; of a group the derivative
+/// of what is summed for the number.
+Vec3d WindingNumber::gradientAt(const Vec3d& p) const {
+  Vec3d sum(0.0);
+  const auto far = [&sum](const Node& node, const Vec3d& r) {
+    const double x = r.x();
+    const double y = r.y();
+    const double z = r.z();
+    const auto& one = node.first;
+    const auto& two = node.second;
+    const double per_squared = 1 / r.lengthSqr();
+    const double trace = one[0] + one[1] + one[2];
+    const Vec3d turned(one[0] * x + one[3] * y + one[4] * z, one[3] * x + one[1] * y + one[5] * z,
+                       one[4] * x + one[5] * y + one[2] * z);
+    const Vec3d thrice(x * (3 * two[0] * x + 2 * (two[3] * y + two[4] * z)) + two[9] * y * z +
+                           two[5] * y * y + two[7] * z * z,
+                       y * (3 * two[1] * y + 2 * (two[5] * x + two[6] * z)) + two[9] * x * z +
+                           two[3] * x * x + two[8] * z * z,
+                       z * (3 * two[2] * z + 2 * (two[7] * x + two[8] * y)) + two[9] * x * y +
+                           two[4] * x * x + two[6] * y * y);
+    const double along = 3 * (node.area.dot(r) + trace) -
+                         per_squared * (15 * turned.dot(r) + 7.5 * node.second_trace.dot(r) -
+                                        17.5 * per_squared * thrice.dot(r));
+    sum += (per_squared *
+                (along * r + 6.0 * turned + 1.5 * node.second_trace - 7.5 * per_squared * thrice) -
+            node.area) *
+           (per_squared * std::sqrt(per_squared));
+  };
+  const auto near = [&](const Node& node) {
+    for (std::uint32_t i = node.begin; i < node.end; ++i) {
+      const std::array<Vec3d, 3> at = corners(order_[i]);
+      for (std::size_t side = 0; side < 3; ++side) {
+        const Vec3d a = at[side] - p;
+        const Vec3d b = at[(side + 1) % 3] - p;
+        const double la = a.length();
+        const double lb = b.length();
+        const double between = la * lb + a.dot(b);
+        if (between > 0) sum += a.cross(b) * ((la + lb) / (la * lb * between));
+      }
+    }
+  };
+  forEach(p, close_radii, far, near);
   return sum / (4 * std::numbers::pi);
 }
 

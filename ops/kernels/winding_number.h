@@ -35,6 +35,9 @@ class WindingNumber {
   /// Within 0.0005 of the exact number, mostly within 0.0001.
   [[nodiscard]] double closelyAt(const openvdb::Vec3d& p) const { return sum(p, close_radii); }
 
+  /// How it rises at p, per mm, mostly within some thousandths. `p` is on no side of a triangle.
+  [[nodiscard]] openvdb::Vec3d gradientAt(const openvdb::Vec3d& p) const;
+
   /// On the side of ½, and of −½, on which the exact number is; as near to it as that takes.
   [[nodiscard]] double judgedAt(const openvdb::Vec3d& p) const;
 
@@ -58,6 +61,10 @@ class WindingNumber {
   [[nodiscard]] std::array<openvdb::Vec3d, 3> corners(std::uint32_t triangle) const;
   [[nodiscard]] Node nodeOf(std::uint32_t begin, std::uint32_t end) const;
   std::uint32_t build(std::uint32_t begin, std::uint32_t end);
+  /// Calls far(node, r), r from p to its centre, for groups that count as one, and near(triangle)
+  /// for all other triangles, leaf by leaf.
+  template <class Far, class Near>
+  void forEach(const openvdb::Vec3d& p, double far_radii, const Far& far, const Near& near) const;
   [[nodiscard]] double sum(const openvdb::Vec3d& p, double far_radii) const;
 
   const Mesh& mesh_;

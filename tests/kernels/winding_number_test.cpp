@@ -38,6 +38,26 @@ TEST(WindingNumber, TheFastOneIsCloseToTheExactOneOnClosedAndOpenSurfaces) {
   }
 }
 
+TEST(WindingNumber, ItsGradientIsThatOfTheExactOne) {
+  Mesh mesh = test::torusMesh({0, 0, 0}, 0.8, 0.3, 60);
+  mesh.triangles.resize(mesh.triangles.size() / 2);
+  const WindingNumber winding(mesh);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(-1.5, 1.5);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3d p(uniform(random), uniform(random), 0.3 * uniform(random));
+    const Vec3d gradient = winding.gradientAt(p);
+    Vec3d expected;
+    constexpr double step = 1e-6;
+    for (int axis = 0; axis < 3; ++axis) {
+      Vec3d aside(0.0);
+      aside[axis] = step;
+      expected[axis] = (winding.exactAt(p + aside) - winding.exactAt(p - aside)) / (2 * step);
+    }
+    ASSERT_LT((gradient - expected).length(), 0.03 * expected.length() + 1e-3) << p;
+  }
+}
+
 TEST(WindingNumber, OfNoTrianglesIsZero) {
   const Mesh mesh;
   EXPECT_EQ(WindingNumber(mesh).at({1, 2, 3}), 0);
