@@ -64,6 +64,33 @@ double solidAngle(const std::array<Vec3d, 3>& corners, const Vec3d& p) {
   return half.im == 0 ? 0 : 2 * std::atan2(half.im, half.re);
 }
 
+double windingOf(const Mesh& mesh, std::span<const std::uint32_t> triangles, const Vec3d& p) {
+  HalfAngleSum sum;
+  for (const std::uint32_t triangle : triangles) sum.add(halfAngle(cornersOf(mesh, triangle), p));
+  return sum.total() / (2 * std::numbers::pi);
+}
+
+Vec3d windingGradientOf(const Mesh& mesh, std::span<const std::uint32_t> triangles,
+                        const Vec3d& p) {
+  Vec3d sum(0.0);
+  for (const std::uint32_t triangle : triangles) {
+    std::array<Vec3d, 3> to = cornersOf(mesh, triangle);
+    std::array<double, 3> length;
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      to[corner] -= p;
+      length[corner] = to[corner].length();
+    }
+    for (std::size_t side = 0; side < 3; ++side) {
+      const std::size_t next = (side + 1) % 3;
+      const double product = length[side] * length[next];
+      const double between = product + to[side].dot(to[next]);
+      if (between > 0)
+        sum += to[side].cross(to[next]) * ((length[side] + length[next]) / (product * between));
+    }
+  }
+  return sum / (4 * std::numbers::pi);
+}
+
 WindingNumber::WindingNumber(const Mesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) {
   std::iota(order_.begin(), order_.end(), 0U);
   middles_.reserve(order_.size());
@@ -75,11 +102,6 @@ WindingNumber::WindingNumber(const Mesh& mesh) : mesh_(mesh), order_(mesh.triang
   if (!order_.empty()) build(0, static_cast<std::uint32_t>(order_.size()));
   middles_.clear();
   middles_.shrink_to_fit();
-}
-
-std::array<Vec3d, 3> WindingNumber::corners(std::uint32_t triangle) const {
-  const Mesh::Triangle& t = mesh_.triangles[triangle];
-  return {mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]};
 }
 
 WindingNumber::Node WindingNumber::nodeOf(std::uint32_t begin, std::uint32_t end) const {
@@ -219,18 +241,13 @@ double WindingNumber::sum(const Vec3d& p, double far_radii) const {
                 (-3 * across - 1.5 * node.second_trace.dot(r) + 7.5 * per_squared * thrice)) *
            per_squared / std::sqrt(squared);
   };
-  const auto near = [&](const Node& node) {
-    HalfAngleSum leaf;
-    for (std::uint32_t i = node.begin; i < node.end; ++i)
-      leaf.add(halfAngle(corners(order_[i]), p));
-    sum += 2 * leaf.total();
-  };
+  double number = 0;
+  const auto near = [&](const Node& node) { number += windingOf(mesh_, trianglesOf(node), p); };
   forEach(p, far_radii, far, near);
-  return sum / (4 * std::numbers::pi);
+  return number + sum / (4 * std::numbers::pi);
 }
 
-/// Of a triangle what its sides add, as currents do to a magnetic field; of a group the derivative
-/// of what is summed for the number.
+/// Of a group the derivative of what is summed for the number.
 Vec3d WindingNumber::gradientAt(const Vec3d& p) const {
   Vec3d sum(0.0);
   const auto far = [&sum](const Node& node, const Vec3d& r) {
@@ -257,21 +274,12 @@ Vec3d WindingNumber::gradientAt(const Vec3d& p) const {
             node.area) *
            (per_squared * std::sqrt(per_squared));
   };
+  Vec3d gradient(0.0);
   const auto near = [&](const Node& node) {
-    for (std::uint32_t i = node.begin; i < node.end; ++i) {
-      const std::array<Vec3d, 3> at = corners(order_[i]);
-      for (std::size_t side = 0; side < 3; ++side) {
-        const Vec3d a = at[side] - p;
-        const Vec3d b = at[(side + 1) % 3] - p;
-        const double la = a.length();
-        const double lb = b.length();
-        const double between = la * lb + a.dot(b);
-        if (between > 0) sum += a.cross(b) * ((la + lb) / (la * lb * between));
-      }
-    }
+    gradient += windingGradientOf(mesh_, trianglesOf(node), p);
   };
   forEach(p, close_radii, far, near);
-  return sum / (4 * std::numbers::pi);
+  return gradient + sum / (4 * std::numbers::pi);
 }
 
 }  // namespace vdbdither

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <openvdb/math/BBox.h>
@@ -15,6 +16,18 @@ namespace vdbdither {
 /// the inside of a solid whose triangles are counter-clockwise seen from outside (van Oosterom and
 /// Strackee 1983). Zero in the triangle's plane.
 double solidAngle(const std::array<openvdb::Vec3d, 3>& corners, const openvdb::Vec3d& p);
+
+/// The generalized winding number of some triangles of a mesh, one by one, and how it rises at p
+/// per mm (as currents along the triangles' sides make a magnetic field). `p` is on no side of one.
+double windingOf(const Mesh& mesh, std::span<const std::uint32_t> triangles,
+                 const openvdb::Vec3d& p);
+openvdb::Vec3d windingGradientOf(const Mesh& mesh, std::span<const std::uint32_t> triangles,
+                                 const openvdb::Vec3d& p);
+
+inline std::array<openvdb::Vec3d, 3> cornersOf(const Mesh& mesh, std::uint32_t triangle) {
+  const Mesh::Triangle& t = mesh.triangles[triangle];
+  return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
+}
 
 /// The generalized winding number of any set of triangles (Jacobson, Kavan, Sorkine-Hornung 2013):
 /// 1 inside a closed surface and 0 outside, ½ on it; fractions where it is open.
@@ -38,6 +51,26 @@ class WindingNumber {
   /// How it rises at p, per mm, mostly within some thousandths. `p` is on no side of a triangle.
   [[nodiscard]] openvdb::Vec3d gradientAt(const openvdb::Vec3d& p) const;
 
+  /// Calls work(triangle) for all that come within `distance_mm` of p, and some others, in an order
+  /// that depends on the mesh alone.
+  template <class Work>
+  void forEachWithin(const openvdb::Vec3d& p, double distance_mm, const Work& work) const {
+    std::vector<std::uint32_t> waiting;
+    if (!nodes_.empty()) waiting.push_back(0);
+    while (!waiting.empty()) {
+      const std::uint32_t index = waiting.back();
+      waiting.pop_back();
+      const Node& node = nodes_[index];
+      const double reach_mm = node.radius + distance_mm;
+      if ((node.centre - p).lengthSqr() > reach_mm * reach_mm) continue;
+      if (node.other == 0) {
+        for (std::uint32_t i = node.begin; i < node.end; ++i) work(order_[i]);
+      } else {
+        waiting.insert(waiting.end(), {node.other, index + 1});
+      }
+    }
+  }
+
   /// On the side of ½, and of −½, on which the exact number is; as near to it as that takes.
   [[nodiscard]] double judgedAt(const openvdb::Vec3d& p) const;
 
@@ -58,11 +91,16 @@ class WindingNumber {
     std::uint32_t other;            ///< the other half's node, the first follows; 0 for a leaf
   };
 
-  [[nodiscard]] std::array<openvdb::Vec3d, 3> corners(std::uint32_t triangle) const;
+  [[nodiscard]] std::array<openvdb::Vec3d, 3> corners(std::uint32_t triangle) const {
+    return cornersOf(mesh_, triangle);
+  }
+  [[nodiscard]] std::span<const std::uint32_t> trianglesOf(const Node& node) const {
+    return {order_.data() + node.begin, node.end - node.begin};
+  }
   [[nodiscard]] Node nodeOf(std::uint32_t begin, std::uint32_t end) const;
   std::uint32_t build(std::uint32_t begin, std::uint32_t end);
-  /// Calls far(node, r), r from p to its centre, for groups that count as one, and near(triangle)
-  /// for all other triangles, leaf by leaf.
+  /// Calls far(node, r), r from p to its centre, for groups that count as one, and near(node)
+  /// for leaves that do not.
   template <class Far, class Near>
   void forEach(const openvdb::Vec3d& p, double far_radii, const Far& far, const Near& near) const;
   [[nodiscard]] double sum(const openvdb::Vec3d& p, double far_radii) const;

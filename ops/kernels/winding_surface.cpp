@@ -16,7 +16,6 @@
 #include <cstdint>
 #include <numeric>
 #include <span>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -27,6 +26,8 @@
 
 #include "ops/kernels/marching_cubes.h"
 #include "ops/kernels/surface_error.h"
+#include "ops/kernels/triangle_and_cube.h"
+#include "ops/kernels/winding_cell.h"
 #include "ops/kernels/winding_number.h"
 #include "vdbdither/openvdb.h"
 
@@ -51,7 +52,9 @@ constexpr double coarse_cells = 64;
 constexpr int most_cuts = 5;
 constexpr int coarse_units = 1 << most_cuts;
 /// What a vertex may miss the tangents at the crossings of its cell by, of the longest side.
-constexpr double tolerance = 2e-4;
+constexpr double tolerance = 1e-4;
+/// Between two passes that are no wall, of the longest side.
+constexpr double least_wall = 4e-4;
 
 Key keyOf(const Coord& ijk) {
   const auto part = [](int index) { return static_cast<Key>(index + key_offset); };
@@ -64,15 +67,55 @@ Coord coordOf(Key key) {
   return {part(key), part(key >> key_bits), part(key >> 2 * key_bits)};
 }
 
-struct Scattered {
-  std::size_t operator()(Key key) const {
-    key *= 0x9e3779b97f4a7c15ULL;
-    return key ^ key >> 32;
-  }
-};
-/// Never walked through, for its order says nothing.
+/// Values by key, never walked through: open addressing, for millions of them.
 template <class T>
-using Map = std::unordered_map<Key, T, Scattered>;
+class Map {
+ public:
+  [[nodiscard]] const T* find(Key key) const {
+    if (slots_.empty()) return nullptr;
+    const Slot& slot = slots_[placeOf(key)];
+    return slot.key == key ? &slot.value : nullptr;
+  }
+  [[nodiscard]] bool contains(Key key) const { return find(key) != nullptr; }
+  [[nodiscard]] const T& at(Key key) const { return *find(key); }
+  /// Returns the value, and whether it is this one that is new.
+  std::pair<T&, bool> add(Key key, const T& value) {
+    if (2 * count_ >= slots_.size()) grow();
+    Slot& slot = slots_[placeOf(key)];
+    const bool is_new = slot.key != key;
+    if (is_new) {
+      slot = {key, value};
+      ++count_;
+    }
+    return {slot.value, is_new};
+  }
+
+ private:
+  static constexpr Key empty = ~Key{0};
+  struct Slot {
+    Key key = empty;
+    T value{};
+  };
+
+  /// Where the key is, or belongs.
+  [[nodiscard]] std::size_t placeOf(Key key) const {
+    Key scattered = key * 0x9e3779b97f4a7c15ULL;
+    scattered ^= scattered >> 32;
+    std::size_t place = scattered & (slots_.size() - 1);
+    while (slots_[place].key != key && slots_[place].key != empty)
+      place = (place + 1) & (slots_.size() - 1);
+    return place;
+  }
+  void grow() {
+    std::vector<Slot> old(std::max<std::size_t>(1024, 2 * slots_.size()));
+    old.swap(slots_);
+    for (const Slot& slot : old)
+      if (slot.key != empty) slots_[placeOf(slot.key)] = slot;
+  }
+
+  std::vector<Slot> slots_;
+  std::size_t count_ = 0;
+};
 
 /// Erases what `is_done` says, which is asked on all threads.
 template <class T, class IsDone>
@@ -90,6 +133,14 @@ template <class T>
 void sortUnique(std::vector<T>& values) {
   tbb::parallel_sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
+}
+
+/// The first of those with the same key.
+template <class T>
+void sortUniqueKeys(std::vector<std::pair<Key, T>>& values) {
+  tbb::parallel_sort(values.begin(), values.end());
+  const auto same = [](const auto& a, const auto& b) { return a.first == b.first; };
+  values.erase(std::unique(values.begin(), values.end(), same), values.end());
 }
 
 /// Tells of a stretch of the whole.
@@ -121,39 +172,102 @@ void forAll(std::size_t count, const Stretch& stretch, const Work& work) {
   }
 }
 
-/// Whether a triangle meets a cube, or nearly: no axis parts them, of the cube's, along the normal,
-/// or across a side in one of the planes between the cube's.
-bool meets(const std::array<Vec3d, 3>& triangle, const Vec3d& middle, double half) {
-  half *= 1 + 1e-6;
-  const std::array<Vec3d, 3> at{triangle[0] - middle, triangle[1] - middle, triangle[2] - middle};
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto [low, high] = std::minmax({at[0][axis], at[1][axis], at[2][axis]});
-    if (low > half || high < -half) return false;
+/// The number of a mesh, in a grid of undivided cells.
+class Cells {
+ public:
+  Cells(const Mesh& mesh, const Bounds& bounds)
+      : mesh_(mesh),
+        winding_(mesh),
+        longest_mm_(bounds.extents()[static_cast<int>(bounds.maxExtent())]),
+        unit_mm_(longest_mm_ / coarse_cells / coarse_units),
+        // A part of a cell that keeps corners out of planes which designers like.
+        origin_mm_(bounds.min() - coarse_units * unit_mm_ * Vec3d(0.3819, 0.4142, 0.3028)),
+        limits_(Coord::floor((bounds.min() - 0.5 * longest_mm_ - origin_mm_) / unit_mm_),
+                Coord::ceil((bounds.max() + 0.5 * longest_mm_ - origin_mm_) / unit_mm_)) {}
+
+  /// The cells from corners, which are made where there are none.
+  std::vector<std::uint32_t> at(const std::vector<Coord>& lows);
+
+  [[nodiscard]] double numberAt(std::uint32_t cell, const Vec3d& p) const {
+    return cells_[cell].at(mesh_, p);
   }
-  const Vec3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
-  if (std::abs(normal.dot(at[0])) >
-      half * (std::abs(normal.x()) + std::abs(normal.y()) + std::abs(normal.z())))
-    return false;
-  for (std::size_t side = 0; side < 3; ++side) {
-    const Vec3d along = at[(side + 1) % 3] - at[side];
-    for (int axis = 0; axis < 3; ++axis) {
-      const int u = (axis + 1) % 3;
-      const int v = (axis + 2) % 3;
-      const double one = along[u] * at[side][v] - along[v] * at[side][u];
-      const Vec3d& opposite = at[(side + 2) % 3];
-      const double other = along[u] * opposite[v] - along[v] * opposite[u];
-      const double reach = half * (std::abs(along[u]) + std::abs(along[v]));
-      if (std::min(one, other) > reach || std::max(one, other) < -reach) return false;
-    }
+  /// The same, but on the side of ½ and −½ on which it is.
+  [[nodiscard]] double judgedAt(std::uint32_t cell, const Vec3d& p) const {
+    constexpr double doubt = 1e-3;
+    const double number = numberAt(cell, p);
+    return std::abs(std::abs(number) - 0.5) < doubt ? winding_.judgedAt(p) : number;
   }
-  return true;
+  [[nodiscard]] Vec3d gradientAt(std::uint32_t cell, const Vec3d& p) const {
+    return cells_[cell].gradientAt(mesh_, p);
+  }
+  [[nodiscard]] const Mesh& mesh() const { return mesh_; }
+  [[nodiscard]] double longestMm() const { return longest_mm_; }
+  [[nodiscard]] double unitMm() const { return unit_mm_; }
+  [[nodiscard]] Vec3d position(const Coord& corner) const {
+    return origin_mm_ + corner.asVec3d() * unit_mm_;
+  }
+  /// Of corners that may be inside.
+  [[nodiscard]] const openvdb::CoordBBox& limits() const { return limits_; }
+
+ private:
+  const Mesh& mesh_;
+  WindingNumber winding_;
+  double longest_mm_, unit_mm_;
+  Vec3d origin_mm_;
+  openvdb::CoordBBox limits_;
+  Map<WindingCell::Corner> corners_;
+  Map<std::uint32_t> cell_at_;
+  std::vector<WindingCell> cells_;
+};
+
+std::vector<std::uint32_t> Cells::at(const std::vector<Coord>& lows) {
+  const auto cornerOf = [](const Coord& low, unsigned corner) {
+    return low.offsetBy((corner & 1) != 0 ? coarse_units : 0, (corner & 2) != 0 ? coarse_units : 0,
+                        (corner & 4) != 0 ? coarse_units : 0);
+  };
+  std::vector<std::uint32_t> found;
+  std::vector<Coord> fresh;
+  std::vector<Key> asked;
+  for (const Coord& low : lows) {
+    const auto [cell, is_new] =
+        cell_at_.add(keyOf(low), static_cast<std::uint32_t>(cells_.size() + fresh.size()));
+    found.push_back(cell);
+    if (!is_new) continue;
+    fresh.push_back(low);
+    for (unsigned corner = 0; corner < 8; ++corner) asked.push_back(keyOf(cornerOf(low, corner)));
+  }
+  sortUnique(asked);
+  eraseAll(asked, [this](Key key) { return corners_.contains(key); });
+  std::vector<WindingCell::Corner> made(asked.size());
+  tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t i) {
+    const Vec3d p = position(coordOf(asked[i]));
+    made[i] = {winding_.closelyAt(p), winding_.gradientAt(p)};
+  });
+  for (std::size_t i = 0; i < asked.size(); ++i) corners_.add(asked[i], made[i]);
+  const std::size_t before = cells_.size();
+  cells_.resize(before + fresh.size());
+  tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
+    std::array<WindingCell::Corner, 8> corners;
+    for (unsigned corner = 0; corner < 8; ++corner)
+      corners[corner] = corners_.at(keyOf(cornerOf(fresh[i], corner)));
+    cells_[before + i] =
+        WindingCell(mesh_, winding_, position(fresh[i]), coarse_units * unit_mm_, corners);
+  });
+  return found;
 }
 
 /// The set and its surface.
 class Octree {
  public:
-  Octree(const Mesh& triangles, const WindingNumber& winding, const Bounds& bounds, double unit_mm,
-         int most_cuts_here, std::size_t most_leaves);
+  /// Of the places where the number exceeds ½, or if `side` is −1 where it is below −½.
+  Octree(Cells& cells, double side, int most_cuts_here, std::size_t most_leaves)
+      : mesh_(cells.mesh()),
+        cells_(cells),
+        side_(side),
+        unit_mm_(cells.unitMm()),
+        smallest_(coarse_units >> most_cuts_here),
+        most_leaves_(most_leaves),
+        tolerance_mm_(tolerance * cells.longestMm()) {}
 
   /// Finds the leaves that triangles or the surface pass.
   void grow(const Stretch& stretch);
@@ -167,6 +281,7 @@ class Octree {
     int size;  ///< in units
     bool divided = false;
     std::uint8_t inside = 0;             ///< by corner, a bit each
+    std::uint32_t cell = 0;              ///< undivided, that it lies in
     std::uint32_t first = 0, count = 0;  ///< the triangles that meet it, in touches_
   };
   /// Of an edge between corners, or a part of one, which no other ends within.
@@ -178,16 +293,17 @@ class Octree {
   /// Where an edge passes the surface.
   struct Crossing {
     Vec3d at{0.0};
-    Vec3d normal{0.0};  ///< unit, in either direction; or zero
-    int passes = 0;     ///< 2 for more
+    Vec3d normal{0.0};       ///< unit, in either direction; or zero
+    int passes = 0;          ///< 2 for more
+    bool is_smooth = false;  ///< clear of triangles
   };
 
-  [[nodiscard]] Vec3d position(const Coord& corner) const {
-    return origin_mm_ + corner.asVec3d() * unit_mm_;
+  [[nodiscard]] Vec3d position(const Coord& corner) const { return cells_.position(corner); }
+  [[nodiscard]] double numberAt(const Leaf& leaf, const Vec3d& p) const {
+    return side_ * cells_.numberAt(leaf.cell, p);
   }
-  [[nodiscard]] std::array<Vec3d, 3> corners(std::uint32_t triangle) const {
-    const Mesh::Triangle& t = mesh_.triangles[triangle];
-    return {mesh_.vertices[t[0]], mesh_.vertices[t[1]], mesh_.vertices[t[2]]};
+  [[nodiscard]] double judgedAt(const Leaf& leaf, const Vec3d& p) const {
+    return side_ * cells_.judgedAt(leaf.cell, p);
   }
   [[nodiscard]] std::span<const std::uint32_t> touchesOf(const Leaf& leaf) const {
     return {touches_.data() + leaf.first, leaf.count};
@@ -210,10 +326,9 @@ class Octree {
                              (corner >> 2 & 1) * leaf.size);
   }
 
-  [[nodiscard]] bool isInside(const Vec3d& p) const { return winding_.judgedAt(p) > 0.5; }
   [[nodiscard]] bool isInside(const Coord& corner) const {
-    const auto found = inside_.find(keyOf(corner));
-    return found != inside_.end() && found->second;
+    const bool* found = inside_.find(keyOf(corner));
+    return found != nullptr && *found;
   }
   [[nodiscard]] std::uint8_t insideOf(const Leaf& leaf) const {
     unsigned inside = 0;
@@ -232,41 +347,26 @@ class Octree {
   [[nodiscard]] static Coord beside(const Edge& edge, int turn);
   [[nodiscard]] bool tellsTooLittle(const Leaf& leaf) const;
   [[nodiscard]] Crossing crossing(const Edge& edge, const Leaf& leaf) const;
-  [[nodiscard]] double smoothCrossing(const Vec3d& from, const Vec3d& along, double low,
-                                      double high) const;
-  [[nodiscard]] Vec3d gradientAt(const Vec3d& p, double step_mm) const;
+  [[nodiscard]] double smoothCrossing(const Leaf& leaf, const Vec3d& from, const Vec3d& along,
+                                      double low, double high) const;
   [[nodiscard]] Vec3d meet(const Leaf& leaf, std::span<const Crossing> crossings) const;
+  [[nodiscard]] Vec3d vertexOf(const Leaf& leaf, std::span<const Crossing> crossings) const;
 
   const Mesh& mesh_;
-  const WindingNumber& winding_;
+  Cells& cells_;
+  double side_;
   double unit_mm_;
   int smallest_;  ///< that leaves may become
   std::size_t most_leaves_;
   double tolerance_mm_;
-  Vec3d origin_mm_;
-  openvdb::CoordBBox limits_;  ///< of corners that may be inside
   std::vector<Leaf> leaves_;
   Map<std::uint32_t> leaf_at_;
   std::vector<std::uint32_t> touches_;
-  Map<bool> inside_;         ///< by corner
-  Map<Crossing> crossings_;  ///< by edge, of those that are cut or pierced
+  Map<bool> inside_;  ///< by corner
+  std::vector<Crossing> crossings_;
+  Map<std::uint32_t> crossing_at_;  ///< by edge, of those that are cut or pierced
   int least_ = coarse_units;
 };
-
-Octree::Octree(const Mesh& triangles, const WindingNumber& winding, const Bounds& bounds,
-               double unit_mm, int most_cuts_here, std::size_t most_leaves)
-    : mesh_(triangles),
-      winding_(winding),
-      unit_mm_(unit_mm),
-      smallest_(coarse_units >> most_cuts_here),
-      most_leaves_(most_leaves),
-      tolerance_mm_(tolerance * bounds.extents()[static_cast<int>(bounds.maxExtent())]) {
-  // A part of a cell that keeps corners out of planes which designers like.
-  origin_mm_ = bounds.min() - coarse_units * unit_mm * Vec3d(0.3819, 0.4142, 0.3028);
-  const double around_mm = 0.5 * bounds.extents()[static_cast<int>(bounds.maxExtent())];
-  limits_ = {Coord::floor((bounds.min() - around_mm - origin_mm_) / unit_mm),
-             Coord::ceil((bounds.max() + around_mm - origin_mm_) / unit_mm)};
-}
 
 /// Edges are numbered as in marching_cubes.h.
 Octree::Edge Octree::edgeOf(const Leaf& leaf, int edge) {
@@ -277,10 +377,10 @@ Octree::Edge Octree::edgeOf(const Leaf& leaf, int edge) {
 }
 
 std::uint32_t Octree::add(const Coord& low, int size) {
-  const auto [place, is_new] =
-      leaf_at_.try_emplace(leafKey(low, size), static_cast<std::uint32_t>(leaves_.size()));
+  const auto [leaf, is_new] =
+      leaf_at_.add(leafKey(low, size), static_cast<std::uint32_t>(leaves_.size()));
   if (is_new) leaves_.push_back({low, size});
-  return place->second;
+  return leaf;
 }
 
 /// Adds the undivided cells that triangles meet: of the columns across the axis that a triangle
@@ -296,12 +396,13 @@ void Octree::addTouched() {
   };
   constexpr std::uint32_t in_a_block = 256;
   const double cell_mm = coarse_units * unit_mm_;
+  const Vec3d origin_mm = position(Coord(0));
   const auto count = static_cast<std::uint32_t>(mesh_.triangles.size());
   std::vector<std::vector<Touch>> blocks((count + in_a_block - 1) / in_a_block);
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
     const auto begin = static_cast<std::uint32_t>(block * in_a_block);
     for (std::uint32_t t = begin; t < std::min(count, begin + in_a_block); ++t) {
-      const std::array<Vec3d, 3> at = corners(t);
+      const std::array<Vec3d, 3> at = cornersOf(mesh_, t);
       const Vec3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
       int w = 0;
       for (int axis = 1; axis < 3; ++axis)
@@ -316,21 +417,21 @@ void Octree::addTouched() {
         high = openvdb::math::maxComponent(high, corner);
       }
       constexpr double rounding = 1e-6;
-      const Vec3d first = (low - origin_mm_) / cell_mm - rounding;
-      const Vec3d last = (high - origin_mm_) / cell_mm + rounding;
+      const Vec3d first = (low - origin_mm) / cell_mm - rounding;
+      const Vec3d last = (high - origin_mm) / cell_mm + rounding;
       const double rise =
           0.5 * (std::abs(normal[u]) + std::abs(normal[v])) / std::abs(normal[w]) + rounding;
       Coord cell;
       for (cell[u] = static_cast<int>(std::floor(first[u])); cell[u] <= last[u]; ++cell[u])
         for (cell[v] = static_cast<int>(std::floor(first[v])); cell[v] <= last[v]; ++cell[v]) {
-          const Vec3d from = (at[0] - origin_mm_) / cell_mm;
+          const Vec3d from = (at[0] - origin_mm) / cell_mm;
           const double height = from[w] - (normal[u] * (cell[u] + 0.5 - from[u]) +
                                            normal[v] * (cell[v] + 0.5 - from[v])) /
                                               normal[w];
           const double top = std::min(height + rise, last[w]);
           for (cell[w] = static_cast<int>(std::floor(std::max(height - rise, first[w])));
                cell[w] <= top; ++cell[w])
-            if (meets(at, origin_mm_ + (cell.asVec3d() + 0.5) * cell_mm, 0.5 * cell_mm))
+            if (meetsCube(at, origin_mm + (cell.asVec3d() + 0.5) * cell_mm, 0.5 * cell_mm))
               blocks[block].push_back({keyOf(cell), t});
         }
     }
@@ -360,11 +461,13 @@ void Octree::divide(std::uint32_t leaf, std::vector<std::uint32_t>& fresh) {
     const Coord low =
         whole.low.offsetBy((part & 1) * size, (part >> 1 & 1) * size, (part >> 2 & 1) * size);
     const std::uint32_t made = add(low, size);
+    leaves_[made].cell = whole.cell;
     leaves_[made].first = static_cast<std::uint32_t>(touches_.size());
     const double half = 0.5 * size * unit_mm_;
     for (std::uint32_t i = whole.first; i < whole.first + whole.count; ++i) {
       const std::uint32_t triangle = touches_[i];
-      if (meets(corners(triangle), position(low) + half, half)) touches_.push_back(triangle);
+      if (meetsCube(cornersOf(mesh_, triangle), position(low) + half, half))
+        touches_.push_back(triangle);
     }
     leaves_[made].count = static_cast<std::uint32_t>(touches_.size()) - leaves_[made].first;
     fresh.push_back(made);
@@ -374,9 +477,9 @@ void Octree::divide(std::uint32_t leaf, std::vector<std::uint32_t>& fresh) {
 /// The leaf that holds a unit, or none.
 std::uint32_t Octree::leafAt(const Coord& unit) const {
   for (int size = coarse_units; size >= least_; size /= 2) {
-    const auto found = leaf_at_.find(leafKey(unit & ~(size - 1), size));
-    if (found == leaf_at_.end()) return none;
-    if (!leaves_[found->second].divided) return found->second;
+    const std::uint32_t* found = leaf_at_.find(leafKey(unit & ~(size - 1), size));
+    if (found == nullptr) return none;
+    if (!leaves_[*found].divided) return *found;
   }
   return none;
 }
@@ -393,26 +496,39 @@ void Octree::grow(const Stretch& stretch) {
   addTouched();
   std::vector<std::uint32_t> fresh(leaves_.size());
   std::iota(fresh.begin(), fresh.end(), 0U);
-  std::vector<Key> asked;
+  std::vector<std::pair<Key, std::uint32_t>> asked;  // corners, and a leaf that has them
   std::vector<char> inside;
   std::vector<std::pair<Key, std::uint32_t>> edges;
   std::vector<Crossing> crossings;
-  bool may_divide = true;
   double done = 0;
   while (!fresh.empty()) {
     // How much is still to come nobody knows.
     const double next = done + 0.25 * (1 - done);
+    std::vector<std::uint32_t> undivided;
+    std::vector<Coord> lows;
+    for (const std::uint32_t leaf : fresh)
+      if (leaves_[leaf].size == coarse_units) {
+        undivided.push_back(leaf);
+        lows.push_back(leaves_[leaf].low);
+      }
+    const std::vector<std::uint32_t> cells = cells_.at(lows);
+    for (std::size_t i = 0; i < cells.size(); ++i) leaves_[undivided[i]].cell = cells[i];
+
     asked.resize(8 * fresh.size());
     tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t i) {
-      asked[i] = keyOf(cornerOf(leaves_[fresh[i / 8]], static_cast<int>(i % 8)));
+      const std::uint32_t leaf = fresh[i / 8];
+      asked[i] = {keyOf(cornerOf(leaves_[leaf], static_cast<int>(i % 8))), leaf};
     });
-    sortUnique(asked);
-    eraseAll(asked,
-             [this](Key key) { return !limits_.isInside(coordOf(key)) || inside_.contains(key); });
+    sortUniqueKeys(asked);
+    eraseAll(asked, [this](const auto& corner) {
+      return !cells_.limits().isInside(coordOf(corner.first)) || inside_.contains(corner.first);
+    });
     inside.assign(asked.size(), 0);
-    forAll(asked.size(), stretch.part(done, 0.5 * (done + next)),
-           [&](std::size_t i) { inside[i] = isInside(position(coordOf(asked[i]))) ? 1 : 0; });
-    for (std::size_t i = 0; i < asked.size(); ++i) inside_[asked[i]] = inside[i] != 0;
+    forAll(asked.size(), stretch.part(done, 0.5 * (done + next)), [&](std::size_t i) {
+      const auto& [key, leaf] = asked[i];
+      inside[i] = judgedAt(leaves_[leaf], position(coordOf(key))) > 0.5 ? 1 : 0;
+    });
+    for (std::size_t i = 0; i < asked.size(); ++i) inside_.add(asked[i].first, inside[i] != 0);
     tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
       leaves_[fresh[i]].inside = insideOf(leaves_[fresh[i]]);
     });
@@ -422,27 +538,27 @@ void Octree::grow(const Stretch& stretch) {
       for (int e = 0; e < 12; ++e)
         if (leaves_[leaf].count > 0 || isCut(leaves_[leaf], e))
           edges.emplace_back(edgeKey(edgeOf(leaves_[leaf], e)), leaf);
-    tbb::parallel_sort(edges.begin(), edges.end());
-    edges.erase(std::unique(edges.begin(), edges.end(),
-                            [](const auto& a, const auto& b) { return a.first == b.first; }),
-                edges.end());
-    eraseAll(edges, [this](const auto& edge) { return crossings_.contains(edge.first); });
+    sortUniqueKeys(edges);
+    eraseAll(edges, [this](const auto& edge) { return crossing_at_.contains(edge.first); });
     crossings.assign(edges.size(), {});
     forAll(edges.size(), stretch.part(0.5 * (done + next), next), [&](std::size_t i) {
       crossings[i] = crossing(edgeOf(edges[i].first), leaves_[edges[i].second]);
     });
     for (std::size_t i = 0; i < edges.size(); ++i)
-      if (crossings[i].passes > 0) crossings_[edges[i].first] = crossings[i];
+      if (crossings[i].passes > 0) {
+        crossing_at_.add(edges[i].first, static_cast<std::uint32_t>(crossings_.size()));
+        crossings_.push_back(crossings[i]);
+      }
     done = next;
 
     std::vector<char> divided(fresh.size(), 0);
-    if (may_divide)
-      tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
-        const Leaf& leaf = leaves_[fresh[i]];
-        divided[i] = leaf.size > smallest_ && tellsTooLittle(leaf) ? 1 : 0;
-      });
+    tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
+      const Leaf& leaf = leaves_[fresh[i]];
+      divided[i] = leaf.size > smallest_ && tellsTooLittle(leaf) ? 1 : 0;
+    });
+    // Where there are too many the small ones stay, so that what is found late is not left coarse.
     const auto dividing = static_cast<std::size_t>(std::count(divided.begin(), divided.end(), 1));
-    may_divide &= leaves_.size() + 8 * dividing <= most_leaves_;
+    if (leaves_.size() + 8 * dividing > most_leaves_) smallest_ = std::max(smallest_, least_);
     std::vector<std::uint32_t> grown;
     for (std::size_t i = 0; i < fresh.size(); ++i) {
       const Leaf leaf = leaves_[fresh[i]];
@@ -456,7 +572,7 @@ void Octree::grow(const Stretch& stretch) {
           if (leaves_.size() > before) grown.push_back(made);
         }
       }
-      if (may_divide && divided[i] != 0) divide(fresh[i], grown);
+      if (divided[i] != 0 && leaf.size > smallest_) divide(fresh[i], grown);
     }
     fresh = std::move(grown);
   }
@@ -468,10 +584,10 @@ bool Octree::tellsTooLittle(const Leaf& leaf) const {
   std::size_t count = 0;
   for (int e = 0; e < 12; ++e) {
     if (leaf.count == 0 && !isCut(leaf, e)) continue;
-    const auto found = crossings_.find(edgeKey(edgeOf(leaf, e)));
-    if (found == crossings_.end()) continue;
-    if (found->second.passes > 1) return true;
-    own[count++] = found->second;
+    const std::uint32_t* found = crossing_at_.find(edgeKey(edgeOf(leaf, e)));
+    if (found == nullptr) continue;
+    own[count++] = crossings_[*found];
+    if (own[count - 1].passes > 1) return true;
   }
   if (count == 0) return false;
   // One polygon of n sides has n − 2 triangles.
@@ -486,9 +602,9 @@ bool Octree::tellsTooLittle(const Leaf& leaf) const {
 
 /// Where the number passes ½ on a stretch that no triangle cuts: regula falsi, held in by halving
 /// the weight of the end that stays (Illinois).
-double Octree::smoothCrossing(const Vec3d& from, const Vec3d& along, double low,
+double Octree::smoothCrossing(const Leaf& leaf, const Vec3d& from, const Vec3d& along, double low,
                               double high) const {
-  const auto above = [&](double t) { return winding_.closelyAt(from + along * t) - 0.5; };
+  const auto above = [&](double t) { return numberAt(leaf, from + along * t) - 0.5; };
   double at_low = above(low);
   double at_high = above(high);
   int kept = 0;
@@ -511,19 +627,6 @@ double Octree::smoothCrossing(const Vec3d& from, const Vec3d& along, double low,
     }
   }
   return 0.5 * (low + high);
-}
-
-/// The direction in which the number changes, where no triangle is near.
-Vec3d Octree::gradientAt(const Vec3d& p, double step_mm) const {
-  Vec3d gradient;
-  const double here = winding_.closelyAt(p);
-  for (int axis = 0; axis < 3; ++axis) {
-    Vec3d step(0.0);
-    step[axis] = step_mm;
-    gradient[axis] = winding_.closelyAt(p + step) - here;
-  }
-  const double length = gradient.length();
-  return length > 0 ? gradient / length : gradient;
 }
 
 /// Where the tangents at crossings meet: the point of least squares, where they say nothing the
@@ -558,6 +661,17 @@ Vec3d Octree::meet(const Leaf& leaf, std::span<const Crossing> crossings) const 
   return at;
 }
 
+/// Where the tangents meet, or near that where the number is ½.
+Vec3d Octree::vertexOf(const Leaf& leaf, std::span<const Crossing> crossings) const {
+  Vec3d at = meet(leaf, crossings);
+  const bool is_smooth = std::all_of(crossings.begin(), crossings.end(),
+                                     [](const Crossing& crossing) { return crossing.is_smooth; });
+  if (!is_smooth || leaf.count > 0) return at;
+  const Vec3d slope = side_ * cells_.gradientAt(leaf.cell, at);
+  const Vec3d step = slope * ((0.5 - numberAt(leaf, at)) / slope.dot(slope));
+  return step.length() < 0.25 * leaf.size * unit_mm_ ? at + step : at;
+}
+
 /// What an edge of the leaf passes.
 Octree::Crossing Octree::crossing(const Edge& edge, const Leaf& leaf) const {
   constexpr double beside = 1e-5;       // of an edge: where a triangle's sides are looked at
@@ -576,7 +690,7 @@ Octree::Crossing Octree::crossing(const Edge& edge, const Leaf& leaf) const {
   };
   std::vector<Pierced> pierced;
   for (const std::uint32_t triangle : touchesOf(leaf)) {
-    const std::array<Vec3d, 3> at = corners(triangle);
+    const std::array<Vec3d, 3> at = cornersOf(mesh_, triangle);
     const Vec3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
     if (normal[edge.axis] == 0) continue;
     int left = 0;
@@ -605,7 +719,7 @@ Octree::Crossing Octree::crossing(const Edge& edge, const Leaf& leaf) const {
     const bool is_sliver =
         !passes.empty() &&
         0.5 * (next.low + next.high - passes.back().low - passes.back().high) * size_mm <
-            2 * tolerance_mm_;
+            least_wall * cells_.longestMm();
     if (is_sliver) {
       passes.pop_back();
     } else {
@@ -617,9 +731,9 @@ Octree::Crossing Octree::crossing(const Edge& edge, const Leaf& leaf) const {
   for (std::size_t i = 0; i < pierced.size(); ++i) {
     const double t = pierced[i].t;
     // Across a triangle the number jumps by one.
-    const double number = winding_.judgedAt(from + along * (t - beside));
+    const double number = judgedAt(leaf, from + along * (t - beside));
     const bool before = number > 0.5;
-    const bool after = number - (pierced[i].normal[edge.axis] > 0 ? 1 : -1) > 0.5;
+    const bool after = number - (pierced[i].normal[edge.axis] > 0 ? side_ : -side_) > 0.5;
     if (before != last) pass({low, t - beside, Vec3d(0.0)});
     if (before != after) pass({t, t, pierced[i].normal});
     low = t + beside;
@@ -631,9 +745,11 @@ Octree::Crossing Octree::crossing(const Edge& edge, const Leaf& leaf) const {
   crossing.passes = static_cast<int>(std::min<std::size_t>(passes.size(), 2));
   const Pass& first = passes.front();
   const bool is_smooth = first.high > first.low;
-  const double t = is_smooth ? smoothCrossing(from, along, first.low, first.high) : first.low;
+  const double t = is_smooth ? smoothCrossing(leaf, from, along, first.low, first.high) : first.low;
   crossing.at = from + along * std::clamp(t, least, 1 - least);
-  crossing.normal = is_smooth ? gradientAt(from + along * t, 0.01 * size_mm) : first.normal;
+  crossing.is_smooth = is_smooth;
+  crossing.normal =
+      is_smooth ? cells_.gradientAt(leaf.cell, from + along * t).unitSafe() : first.normal;
   return crossing;
 }
 
@@ -666,7 +782,7 @@ Mesh Octree::surface() const {
   mesh.vertices.resize(cut.size());
   std::vector<std::pair<std::uint32_t, std::uint32_t>> of_leaf;  // and which edge
   for (std::uint32_t i = 0; i < cut.size(); ++i) {
-    mesh.vertices[i] = crossings_.at(cut[i].edge).at;
+    mesh.vertices[i] = crossings_[crossing_at_.at(cut[i].edge)].at;
     for (const std::uint32_t leaf : cut[i].leaves) of_leaf.emplace_back(leaf, i);
   }
   sortUnique(of_leaf);
@@ -682,8 +798,8 @@ Mesh Octree::surface() const {
   tbb::parallel_for(std::size_t{0}, begins.size() - 1, [&](std::size_t i) {
     std::vector<Crossing> crossings;
     for (std::uint32_t c = begins[i]; c < begins[i + 1]; ++c)
-      crossings.push_back(crossings_.at(cut[of_leaf[c].second].edge));
-    mesh.vertices[cut.size() + i] = meet(leaves_[of_leaf[begins[i]].first], crossings);
+      crossings.push_back(crossings_[crossing_at_.at(cut[of_leaf[c].second].edge)]);
+    mesh.vertices[cut.size() + i] = vertexOf(leaves_[of_leaf[begins[i]].first], crossings);
   });
   mesh.triangles.reserve(4 * cut.size());
   for (std::uint32_t i = 0; i < cut.size(); ++i) {
@@ -706,28 +822,18 @@ WindingSurface windingSurface(const Mesh& triangles, const std::function<void(do
   Bounds bounds;
   for (const Mesh::Triangle& t : triangles.triangles)
     for (const std::uint32_t v : t) bounds.expand(triangles.vertices[v]);
-  const double longest_mm =
-      bounds.empty() ? 0 : bounds.extents()[static_cast<int>(bounds.maxExtent())];
-  if (!(longest_mm > 0)) return made;
-  const double unit_mm = longest_mm / coarse_cells / coarse_units;
+  if (bounds.empty() || !(bounds.extents().length() > 0)) return made;
 
   const Stretch stretch(progress);
-  Mesh faced = triangles;
-  const auto turn = [&faced] {
-    for (Mesh::Triangle& t : faced.triangles) std::swap(t[1], t[2]);
+  Cells cells(triangles, bounds);
+  const auto volume = [&](double side, const Stretch& told) {
+    Octree coarse(cells, side, 0, 0);
+    coarse.grow(told);
+    return volumeOf(coarse.surface());
   };
-  std::array<double, 2> volumes{};
-  for (std::size_t turned = 0; turned < 2; ++turned) {
-    const WindingNumber winding(faced);
-    Octree coarse(faced, winding, bounds, unit_mm, 0, 0);
-    coarse.grow(stretch.part(0.05 * static_cast<double>(turned), 0.05 * (1 + turned)));
-    volumes[turned] = volumeOf(coarse.surface());
-    turn();
-  }
-  made.turned = volumes[1] > 2 * volumes[0];
-  if (made.turned) turn();
-  const WindingNumber winding(faced);
-  Octree fine(faced, winding, bounds, unit_mm, most_cuts, most_leaves);
+  const double outwards = volume(1, stretch.part(0, 0.05));
+  made.turned = volume(-1, stretch.part(0.05, 0.1)) > 2 * outwards;
+  Octree fine(cells, made.turned ? -1 : 1, most_cuts, most_leaves);
   fine.grow(stretch.part(0.1, 1));
   made.cell_mm = fine.leastMm();
   made.mesh = fine.surface();

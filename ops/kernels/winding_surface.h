@@ -30,6 +30,6 @@ struct WindingSurface {
 /// `triangles` in mm. `progress` is told fractions, from the calling thread.
 WindingSurface windingSurface(const Mesh& triangles,
                               const std::function<void(double)>& progress = {},
-                              std::size_t most_leaves = 1'500'000);
+                              std::size_t most_leaves = 3'000'000);
 
 }  // namespace vdbdither

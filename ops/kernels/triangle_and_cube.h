@@ -1,0 +1,14 @@
+#pragma once
+
+#include <array>
+
+#include <openvdb/math/Vec3.h>
+
+namespace vdbdither {
+
+/// Whether a triangle meets the cube that reaches `half` from its middle along each axis, or nearly
+/// (Akenine-Möller: "Fast 3D triangle-box overlap testing", 2001).
+bool meetsCube(const std::array<openvdb::Vec3d, 3>& triangle, const openvdb::Vec3d& middle,
+               double half);
+
+}  // namespace vdbdither
