@@ -13,7 +13,7 @@
 #include <optional>
 #include <utility>
 
-#include <openvdb/math/Vec3.h>
+#include <openvdb/Types.h>
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/mesh_edges.h"

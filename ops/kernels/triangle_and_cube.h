@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include <openvdb/math/Vec3.h>
+#include <openvdb/Types.h>
 
 namespace vdbdither {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <openvdb/math/Vec3.h>
+#include <openvdb/Types.h>
 
 #include "ops/kernels/winding_number.h"
 #include "vdbdither/mesh.h"
@@ -14,8 +14,7 @@ namespace vdbdither {
 /// The generalized winding number within a cube, for many places in it: of triangles near the cube
 /// one by one, of all others a polynomial that has their number and its gradient at the cube's
 /// corners (of the third degree and some terms of the fourth and fifth; in the plane, Adini's
-/// rectangle). Where no side of a triangle is nearer than the edge of the cube it is within some
-/// 1e-4 of WindingNumber::closelyAt, and far nearer where they are farther away.
+/// rectangle). Within 0.002 of WindingNumber::closelyAt, mostly within 0.0001.
 class WindingCell {
  public:
   /// What WindingNumber says at a corner.

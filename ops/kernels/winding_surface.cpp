@@ -580,6 +580,8 @@ void Octree::grow(const Stretch& stretch) {
 
 /// Whether one vertex does not tell what the surface does in the leaf.
 bool Octree::tellsTooLittle(const Leaf& leaf) const {
+  // Between two triangles may be what passes no edge.
+  if (leaf.count > 1 && leaf.size > 8) return true;
   std::array<Crossing, 12> own;
   std::size_t count = 0;
   for (int e = 0; e < 12; ++e) {
