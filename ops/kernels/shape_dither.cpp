@@ -288,18 +288,24 @@ ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
         LeafBits inside = insideBits(leaf, within);
         const LeafBits undecided = bandBits(leaf, bound, within);
         voxel_normals.visit(leaf, undecided);
+        LeafBits overturned{};
         forEachBit(moved ? undecided : f.overturnable(undecided), [&](unsigned offset) {
           const float plain = distances[offset];
-          float d = plain + f(offset, plain);
-          if (guarded && (d < 0) != (plain < 0) &&
-              !guard.allows(voxel_normals.around(), leaf.origin(), offset, voxel_normals(offset),
-                            plain)) {
-            d = plain;
-          }
-          const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
-          inside[offset / 64] = d < 0 ? inside[offset / 64] | bit : inside[offset / 64] & ~bit;
+          const float d = plain + f(offset, plain);
+          overturned[offset / 64] |= std::uint64_t{(d < 0) != (plain < 0)} << (offset % 64);
           if (moved) moved->setValueOnly(offset, d);
         });
+        if (guarded) {
+          forEachBit(overturned, [&](unsigned offset) {
+            const float plain = distances[offset];
+            if (guard.allows(voxel_normals.around(), leaf.origin(), offset, voxel_normals(offset),
+                             plain))
+              return;
+            overturned[offset / 64] &= ~(std::uint64_t{1} << (offset % 64));
+            if (moved) moved->setValueOnly(offset, plain);
+          });
+        }
+        for (unsigned x = 0; x < 8; ++x) inside[x] ^= overturned[x];
         printed[n] = {leaf.origin(), inside};
       }
     });
