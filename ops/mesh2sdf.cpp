@@ -150,32 +150,55 @@ class MeshToSdf : public Source {
     return walls;
   }
 
-  /// Makes `mesh` bound a solid: by repair, or where triangles of a file enclose nothing by the
-  /// surface of what they hint at. Of several files also each by itself; what is repaired in them
-  /// is told of the whole.
+  /// A mesh that bounds a solid, and how it came to.
+  struct Closed {
+    Mesh mesh;
+    MeshRepairs repairs;
+    bool is_guess;
+  };
+
+  /// A file's mesh made to bound a solid: by repair, or where its triangles enclose nothing by the
+  /// surface of what they hint at.
+  Closed closedAlone(Mesh mesh) {
+    // Should the triangles prove loose, they are wanted as they came. Repair leaves the vertices
+    // and adds others behind them.
+    std::vector<Mesh::Triangle> given = mesh.triangles;
+    const std::size_t given_vertices = mesh.vertices.size();
+    Closed closed{{}, {}, false};
+    closed.mesh = repaired(std::move(mesh), closed.repairs);
+    const std::size_t triangles = closed.mesh.triangles.size();
+    closed.is_guess = closed.repairs.areOfLooseTriangles(triangles);
+    if (closed.is_guess) {
+      closed.mesh.triangles = std::move(given);
+      closed.mesh.vertices.resize(given_vertices);
+      closed.mesh = guessed(std::move(closed.mesh), triangles, closed.repairs);
+    }
+    return closed;
+  }
+
+  /// Makes `mesh` bound a solid. Of several files also each by itself; what is repaired in them is
+  /// told of the whole.
   std::vector<Mesh> closed(Mesh& mesh) {
+    if (paths_.size() == 1) {
+      Closed closed = closedAlone(std::move(mesh));
+      mesh = std::move(closed.mesh);
+      is_guess_ = closed.is_guess;
+      if (!is_guess_) repairs_ = closed.repairs;
+      return {};
+    }
     std::vector<Mesh> parts;
     std::vector<Mesh> meshes;
     std::vector<Mesh> guesses;
     for (Mesh& part : separated(mesh)) {
-      MeshRepairs repairs;
-      parts.push_back(repaired(part, repairs));
-      if (repairs.areOfLooseTriangles(parts.back().triangles.size())) {
-        parts.back() = guessed(std::move(part), parts.back().triangles.size(), repairs);
+      Closed closed = closedAlone(part);
+      parts.push_back(std::move(closed.mesh));
+      if (closed.is_guess) {
         guesses.push_back(parts.back());
-      } else if (paths_.size() == 1) {
-        repairs_ = repairs;
-        meshes.push_back(std::move(parts.back()));
       } else {
         meshes.push_back(std::move(part));
       }
     }
-    mesh = joined(std::move(meshes));
-    if (paths_.size() == 1) {
-      parts.clear();
-    } else {
-      mesh = repaired(std::move(mesh), repairs_);
-    }
+    mesh = repaired(joined(std::move(meshes)), repairs_);
     is_guess_ = mesh.triangles.empty() && !guesses.empty();
     guesses.insert(guesses.begin(), std::move(mesh));
     mesh = joined(std::move(guesses));
