@@ -40,9 +40,13 @@ class FrameReader {
   /// or is damaged.
   std::optional<Slab> next();
 
+  /// All that comes, to its end: frames joined to what a file of them would hold, or the single
+  /// archive of another tool, whatever its transforms. Throws DataError like `next`.
+  static VdbContents readWhole(int descriptor, const std::string& where);
+
  private:
-  std::string take(std::size_t size);
-  VdbContents receive();
+  /// `first`: the archive that the pipe began with.
+  FrameReader(int descriptor, std::string where, VdbContents first);
 
   int descriptor_;
   std::string where_;

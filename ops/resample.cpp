@@ -6,6 +6,7 @@
 
 #include <tbb/parallel_reduce.h>
 
+#include "io/frames.h"
 #include "io/target_lattice.h"
 #include "io/vdb.h"
 #include "ops/kernels/held_band.h"
@@ -118,7 +119,7 @@ class Resample : public Source {
     if (isPipe() && ::isatty(STDIN_FILENO))
       throw UsageError("nothing is piped in; name a file: resample part.vdb");
     const VdbContents contents =
-        isPipe() ? readVdbPipe(STDIN_FILENO, "standard input") : readVdb(path_);
+        isPipe() ? FrameReader::readWhole(STDIN_FILENO, "standard input") : readVdb(path_);
     if (const auto history = contents.metadata.find("vdbdither:history");
         history != contents.metadata.end()) {
       schema.metadata.insert(*history);
