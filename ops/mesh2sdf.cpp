@@ -19,22 +19,7 @@ namespace vdbdither {
 
 namespace {
 
-using openvdb::Coord;
-using openvdb::CoordBBox;
 using openvdb::Vec3d;
-
-/// `meshes` in one, one after the other.
-Mesh joined(std::vector<Mesh> meshes) {
-  if (meshes.empty()) return {};
-  Mesh all = std::move(meshes.front());
-  for (auto mesh = meshes.begin() + 1; mesh != meshes.end(); ++mesh) {
-    const auto first = static_cast<std::uint32_t>(all.vertices.size());
-    all.vertices.insert(all.vertices.end(), mesh->vertices.begin(), mesh->vertices.end());
-    for (const Mesh::Triangle& t : mesh->triangles)
-      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
-  return all;
-}
 
 /// `surface` from triangle meshes.
 class MeshToSdf : public Source {
@@ -73,7 +58,7 @@ class MeshToSdf : public Source {
     place(mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
     questionSize(mesh, schema);
     const std::vector<Mesh> parts = closed(mesh);  // which a guess may make larger
-    schema.lattice = latticeAround(mesh, pitch_mm);
+    schema.lattice = latticeOfMesh(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
     for (const Mesh& part : parts)
       parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
@@ -311,30 +296,11 @@ class MeshToSdf : public Source {
            shortestText(std::round(best_mm * 100) / 100) + " mm";
   }
 
-  /// The voxels within a voxel diagonal, or the band, of the mesh's bounding box; where y is
-  /// refined, the same region in finer voxels.
-  Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm) const {
+  /// The voxels within a voxel diagonal, or the band, of the mesh's bounding box.
+  [[nodiscard]] Lattice latticeOfMesh(const Mesh& mesh, const Vec3d& pitch_mm) const {
     const MeshBounds bounds = boundsOf(mesh);
     const double margin_mm = std::max(pitch_mm.length(), band_.greatestMm(pitch_mm));
-    for (int axis = 0; axis < 3; ++axis) {
-      const double furthest_mm =
-          std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) + margin_mm;
-      if (!(furthest_mm / pitch_mm[axis] * refine_y_ < 1e8))
-        throw DataError(
-            "the mesh reaches " + shortestText(furthest_mm) +
-            " mm from the origin, more voxels than can be counted; check --unit and --scale");
-    }
-    Lattice lattice{pitch_mm, Vec3d(0, 0, 0),
-                    CoordBBox(Coord::floor((bounds.min - margin_mm) / pitch_mm),
-                              Coord::ceil((bounds.max + margin_mm) / pitch_mm))};
-    if (refine_y_ > 1) {
-      // The centres of the finer voxels lie symmetrically about that of the one they replace.
-      lattice.origin_mm.y() = -0.5 * pitch_mm.y() * (refine_y_ - 1) / refine_y_;
-      lattice.pitch_mm.y() = pitch_mm.y() / refine_y_;
-      lattice.box.min().y() *= refine_y_;
-      lattice.box.max().y() = lattice.box.max().y() * refine_y_ + refine_y_ - 1;
-    }
-    return lattice;
+    return latticeAround(bounds.min, bounds.max, margin_mm, pitch_mm, refine_y_);
   }
 
   /// How many leaves come within `band_mm` of a triangle, of the share that it has in a surface.

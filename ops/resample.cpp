@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <unistd.h>
@@ -10,6 +9,7 @@
 #include "io/target_lattice.h"
 #include "io/vdb.h"
 #include "ops/kernels/held_band.h"
+#include "ops/kernels/mesh_placement.h"
 #include "ops/kernels/zero_set_distance.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
@@ -19,14 +19,9 @@ namespace vdbdither {
 
 namespace {
 
-using openvdb::Coord;
-using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::Mat4d;
 using openvdb::Vec3d;
-
-constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{
-    {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}, {"um", 0.001}}};
 
 FloatGrid::ConstPtr asFloats(const GridConstPtr& grid) {
   if (auto floats = openvdb::gridConstPtrCast<FloatGrid>(grid)) return floats;
@@ -89,7 +84,9 @@ class Resample : public Source {
     if (band_mm_ < 0) throw UsageError("--band: is below zero");
     const FloatGrid::ConstPtr grid = readSurface(schema);
     surface_ = zeroSet(grid, pitch_mm);
-    schema.lattice = latticeAround(surface_->bounds(), pitch_mm);
+    const ZeroSet::Bounds bounds = surface_->bounds();
+    schema.lattice =
+        latticeAround(bounds.min, bounds.max, std::max(pitch_mm.length(), band_mm_), pitch_mm);
     const Band band{1, band_mm_};
     schema.leaves = leavesOf(schema.lattice, band);
     // As if the surface were spread evenly over the layers but for a factor of two.
@@ -184,10 +181,8 @@ class Resample : public Source {
   }
 
   std::shared_ptr<const ZeroSet> zeroSet(const FloatGrid::ConstPtr& grid, const Vec3d& pitch_mm) {
-    const auto unit = std::find_if(units_mm.begin(), units_mm.end(),
-                                   [this](const auto& known) { return known.first == unit_; });
     Mat4d map = grid->transform().baseMap()->getAffineMap()->getMat4();
-    map.postScale(Vec3d(unit->second * scale_));
+    map.postScale(Vec3d(unitMm(unit_) * scale_));
     if (!(std::abs(map.det()) > 0))
       throw DataError("grid '" + grid_name_ + "' has a transform without volume");
     const ZeroSet::Reading reading = readingOf(*grid);
@@ -214,21 +209,6 @@ class Resample : public Source {
     if (!place_) return surface;
     map.postTranslate(-surface->bounds().min);
     return made(map);
-  }
-
-  [[nodiscard]] Lattice latticeAround(const ZeroSet::Bounds& bounds, const Vec3d& pitch_mm) const {
-    const double margin_mm = std::max(pitch_mm.length(), band_mm_);
-    for (int axis = 0; axis < 3; ++axis) {
-      const double furthest_mm =
-          std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) + margin_mm;
-      if (!(furthest_mm / pitch_mm[axis] < 1e8))
-        throw DataError("the part reaches " + shortestText(furthest_mm) +
-                        " mm from the origin, more voxels than can be counted; check --unit and "
-                        "--scale");
-    }
-    return {pitch_mm, Vec3d(0, 0, 0),
-            CoordBBox(Coord::floor((bounds.min - margin_mm) / pitch_mm),
-                      Coord::ceil((bounds.max + margin_mm) / pitch_mm))};
   }
 
   [[nodiscard]] double leavesOf(const Lattice& lattice, const Band& band) const {

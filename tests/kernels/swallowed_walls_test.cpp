@@ -8,6 +8,7 @@
 #include <openvdb/math/BBox.h>
 
 #include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/mesh_placement.h"
 #include "tests/support/shapes.h"
 
 namespace vdbdither {
@@ -17,21 +18,10 @@ using openvdb::CoordBBox;
 using openvdb::Vec3d;
 using Box = openvdb::math::BBox<Vec3d>;
 
-Mesh together(const std::vector<Mesh>& parts) {
-  Mesh all;
-  for (const Mesh& part : parts) {
-    const auto first = static_cast<std::uint32_t>(all.vertices.size());
-    all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
-    for (const Mesh::Triangle& t : part.triangles)
-      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
-  return all;
-}
-
 Mesh meshOf(const std::vector<Box>& boxes) {
   std::vector<Mesh> parts;
   for (const Box& box : boxes) parts.push_back(test::boxMesh(box.min(), box.max()));
-  return together(parts);
+  return joined(std::move(parts));
 }
 
 double distanceTo(const Box& box, const Vec3d& p) {
@@ -120,8 +110,7 @@ TEST(SwallowedWalls, FacesInOnePlaneStaySurface) {
 TEST(SwallowedWalls, ACavityIsSurface) {
   Mesh cavity = test::boxMesh({0.3, 0.3, 0.3}, {0.7, 0.7, 0.7});
   for (Mesh::Triangle& t : cavity.triangles) std::swap(t[0], t[1]);
-  EXPECT_TRUE(
-      swallowedWalls(together({test::boxMesh({0, 0, 0}, {1, 1, 1}), cavity})).hidden.empty());
+  EXPECT_TRUE(swallowedWalls(joined({test::boxMesh({0, 0, 0}, {1, 1, 1}), cavity})).hidden.empty());
 }
 
 }  // namespace
