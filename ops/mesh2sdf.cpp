@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "io/mesh_reader.h"
 #include "io/printer_profile.h"
@@ -63,11 +62,7 @@ class MeshToSdf : public Source {
     for (const Mesh& part : parts)
       parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
     const SwallowedWalls hidden = wallsOf(mesh);
-    const auto triangles = static_cast<double>(mesh.triangles.size());
-    const std::vector<double> leaves = leavesOfRows(mesh, lattice);
-    triangles_per_leaf_ = triangles / leavesAtSurface(mesh, lattice);
-    schema.leaves_per_row = *std::max_element(leaves.begin(), leaves.end());
-    schema.leaves = std::accumulate(leaves.begin(), leaves.end(), 0.0);
+    countLeaves(mesh, schema);
     field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, hidden);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
@@ -84,7 +79,7 @@ class MeshToSdf : public Source {
     const double per_leaf =
         2 + 1.2 * triangles_per_leaf_ + (extras_.normals ? 8 : 0) + (extras_.closest ? 2 : 0);
     const double fields = parts_.empty() ? 1 : 2;
-    return Work{.us_per_leaf = fields * per_leaf};
+    return Work{.us_per_held_leaf = fields * per_leaf};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {
@@ -303,46 +298,44 @@ class MeshToSdf : public Source {
     return latticeAround(bounds.min, bounds.max, margin_mm, pitch_mm, refine_y_);
   }
 
-  /// How many leaves come within `band_mm` of a triangle, of the share that it has in a surface.
-  static double leavesNear(const Mesh& mesh, const Mesh::Triangle& t, const Vec3d& leaf_mm,
-                           double band_mm) {
-    const Vec3d& a = mesh.vertices[t[0]];
-    const Vec3d area = 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
-    // The region within the band of the triangle, widened by the leaf's own extent along its
-    // normal.
-    const double across = std::abs(area.x()) * leaf_mm.x() + std::abs(area.y()) * leaf_mm.y() +
-                          std::abs(area.z()) * leaf_mm.z();
-    return (2 * band_mm * area.length() + across) / leaf_mm.product();
-  }
-
-  /// How many leaves the surface itself meets.
-  static double leavesAtSurface(const Mesh& mesh, const Lattice& lattice) {
-    double leaves = 0;
-    for (const Mesh::Triangle& t : mesh.triangles)
-      leaves += leavesNear(mesh, t, lattice.pitch_mm * double{leaf_layers}, 0);
-    return leaves;
-  }
-
   /// Every leaf that the band meets, spread by the area of the surface over the rows that it
-  /// crosses.
-  std::vector<double> leavesOfRows(const Mesh& mesh, const Lattice& lattice) const {
+  /// crosses, and how many of them the surface itself does.
+  void countLeaves(const Mesh& mesh, Schema& schema) {
+    const Lattice& lattice = schema.lattice;
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
-    const auto rows = static_cast<std::size_t>(lattice.layers().size() / leaf_layers + 2);
     const double low = lattice.layers().begin * lattice.pitch_mm.z();
-    std::vector<double> leaves(rows + 1, 0.0);
     const double band_mm = band_.greatestMm(lattice.pitch_mm);
+    const auto top_row = static_cast<double>(lattice.layers().size() / leaf_layers + 1);
+    std::vector<double> rows(static_cast<std::size_t>(top_row) + 1, 0.0);
+    double area_mm2 = 0;
+    double across_mm3 = 0;  // swept by leaves that touch the surface
+    const auto leavesWithin = [&](double distance_mm, double area, double across) {
+      return (2 * distance_mm * area + across) / leaf_mm.product();
+    };
     for (const Mesh::Triangle& t : mesh.triangles) {
-      const double touched = leavesNear(mesh, t, leaf_mm, band_mm);
+      const Vec3d& a = mesh.vertices[t[0]];
+      const Vec3d facing = 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
+      const double area = facing.length();
+      // The leaf's own extent along the normal.
+      const double across = std::abs(facing.x()) * leaf_mm.x() +
+                            std::abs(facing.y()) * leaf_mm.y() + std::abs(facing.z()) * leaf_mm.z();
+      area_mm2 += area;
+      across_mm3 += across;
       const auto [z_low, z_high] =
           std::minmax({mesh.vertices[t[0]].z(), mesh.vertices[t[1]].z(), mesh.vertices[t[2]].z()});
-      const auto first = static_cast<std::size_t>(
-          std::clamp((z_low - band_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
+      const auto first =
+          static_cast<std::size_t>(std::clamp((z_low - band_mm - low) / leaf_mm.z(), 0.0, top_row));
       const auto last = static_cast<std::size_t>(
-          std::clamp((z_high + band_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
+          std::clamp((z_high + band_mm - low) / leaf_mm.z(), 0.0, top_row));
       for (std::size_t row = first; row <= last; ++row)
-        leaves[row] += touched / static_cast<double>(last - first + 1);
+        rows[row] += leavesWithin(band_mm, area, across) / static_cast<double>(last - first + 1);
     }
-    return leaves;
+    triangles_per_leaf_ =
+        static_cast<double>(mesh.triangles.size()) / leavesWithin(0, area_mm2, across_mm3);
+    schema.leaves_per_row = *std::max_element(rows.begin(), rows.end());
+    schema.leaves = leavesWithin(band_mm, area_mm2, across_mm3);
+    schema.surface_leaves =
+        leavesWithin(std::min(band_mm, lattice.pitch_mm.length()), area_mm2, across_mm3);
   }
 
   [[nodiscard]] Grids gridsOf(const DistanceGrids& made) const {

@@ -88,7 +88,9 @@ class Resample : public Source {
     schema.lattice =
         latticeAround(bounds.min, bounds.max, std::max(pitch_mm.length(), band_mm_), pitch_mm);
     const Band band{1, band_mm_};
-    schema.leaves = leavesOf(schema.lattice, band);
+    schema.leaves = leavesOf(schema.lattice, band.greatestMm(pitch_mm));
+    schema.surface_leaves =
+        leavesOf(schema.lattice, std::min(band.greatestMm(pitch_mm), pitch_mm.length()));
     // As if the surface were spread evenly over the layers but for a factor of two.
     schema.leaves_per_row =
         2 * schema.leaves / (schema.lattice.layers().size() / static_cast<double>(leaf_layers) + 1);
@@ -101,7 +103,7 @@ class Resample : public Source {
 
   [[nodiscard]] double memoryBytes() const override { return surface_->memoryBytes(); }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 400}; }
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 400}; }
 
   [[nodiscard]] Grids run(ZRange core) const override {
     const FloatGrid::Ptr surface = field_->run(core);
@@ -211,12 +213,12 @@ class Resample : public Source {
     return made(map);
   }
 
-  [[nodiscard]] double leavesOf(const Lattice& lattice, const Band& band) const {
+  [[nodiscard]] double leavesOf(const Lattice& lattice, double band_mm) const {
     // Three divisions are passed where the area is that of the faces of two.
     const double area = surface_->cells() * division_mm2_ / 1.5;
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
     const double across_mm = 0.5 * (leaf_mm.x() + leaf_mm.y() + leaf_mm.z());
-    return area * (2 * band.greatestMm(lattice.pitch_mm) + across_mm) / leaf_mm.product();
+    return area * (2 * band_mm + across_mm) / leaf_mm.product();
   }
 
   std::string path_;
