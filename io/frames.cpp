@@ -85,7 +85,7 @@ void FrameWriter::send(const VdbContents& contents) {
   }
 }
 
-FrameReader::FrameReader(int descriptor, std::string where)
+FrameReader::FrameReader(int descriptor, const std::string& where)
     : FrameReader(descriptor, where, receive(descriptor, where, false)) {}
 
 FrameReader::FrameReader(int descriptor, std::string where, VdbContents first)

@@ -32,7 +32,7 @@ class FrameWriter {
 class FrameReader {
  public:
   /// `where` names the pipe in messages. Throws DataError for anything that is no VDB stream.
-  FrameReader(int descriptor, std::string where);
+  FrameReader(int descriptor, const std::string& where);
 
   [[nodiscard]] const Schema& schema() const { return schema_; }
 

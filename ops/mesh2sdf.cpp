@@ -305,8 +305,12 @@ class MeshToSdf : public Source {
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
     const double low = lattice.layers().begin * lattice.pitch_mm.z();
     const double band_mm = band_.greatestMm(lattice.pitch_mm);
-    const auto top_row = static_cast<double>(lattice.layers().size() / leaf_layers + 1);
+    const int top_row = lattice.layers().size() / leaf_layers + 1;
     std::vector<double> rows(static_cast<std::size_t>(top_row) + 1, 0.0);
+    const auto rowAt = [&](double z_mm) {
+      return static_cast<std::size_t>(
+          std::clamp((z_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(top_row)));
+    };
     double area_mm2 = 0;
     double across_mm3 = 0;  // swept by leaves that touch the surface
     const auto leavesWithin = [&](double distance_mm, double area, double across) {
@@ -323,10 +327,8 @@ class MeshToSdf : public Source {
       across_mm3 += across;
       const auto [z_low, z_high] =
           std::minmax({mesh.vertices[t[0]].z(), mesh.vertices[t[1]].z(), mesh.vertices[t[2]].z()});
-      const auto first =
-          static_cast<std::size_t>(std::clamp((z_low - band_mm - low) / leaf_mm.z(), 0.0, top_row));
-      const auto last = static_cast<std::size_t>(
-          std::clamp((z_high + band_mm - low) / leaf_mm.z(), 0.0, top_row));
+      const std::size_t first = rowAt(z_low - band_mm);
+      const std::size_t last = rowAt(z_high + band_mm);
       for (std::size_t row = first; row <= last; ++row)
         rows[row] += leavesWithin(band_mm, area, across) / static_cast<double>(last - first + 1);
     }
