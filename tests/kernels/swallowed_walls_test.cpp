@@ -22,6 +22,7 @@ using Box = openvdb::math::BBox<Vec3d>;
 
 Mesh meshOf(const std::vector<Box>& boxes) {
   std::vector<Mesh> parts;
+  parts.reserve(boxes.size());
   for (const Box& box : boxes) parts.push_back(test::boxMesh(box.min(), box.max()));
   return joined(std::move(parts));
 }
@@ -86,6 +87,7 @@ void expectDistancesToTheUnion(const std::vector<Box>& boxes, const Mesh& mesh,
 void expectDistancesToTheUnion(const std::vector<Box>& boxes) {
   for (const openvdb::Coord& away : {openvdb::Coord(0), openvdb::Coord(2400, -9000, 34000)}) {
     std::vector<Box> moved;
+    moved.reserve(boxes.size());
     const Vec3d by_mm = away.asVec3d() * pitch_mm;
     for (const Box& box : boxes) moved.emplace_back(box.min() + by_mm, box.max() + by_mm);
     const Mesh mesh = meshOf(moved);
