@@ -4,13 +4,16 @@
 #include <cerrno>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <sstream>
 #include <unistd.h>
+#include <vector>
 
 #include "io/archive_digest.h"
 #include "io/pipe_input.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/interrupt.h"
+#include "vdbdither/layers.h"
 #include "vdbdither/openvdb.h"
 
 namespace vdbdither {
@@ -18,6 +21,36 @@ namespace vdbdither {
 namespace {
 
 constexpr const char* frame_key = "vdbdither:frame";
+
+/// Up to `size` bytes; fewer where the pipe ends.
+std::string take(int descriptor, const std::string& where, std::size_t size) {
+  constexpr std::size_t chunk = 1 << 20;
+  std::string bytes;
+  // Room grows with what comes: a damaged length must not ask for all of memory.
+  while (bytes.size() < size) {
+    const std::size_t begin = bytes.size();
+    bytes.resize(begin + std::min(chunk, size - begin));
+    const std::size_t count =
+        readSome(descriptor, bytes.data() + begin, bytes.size() - begin, where);
+    bytes.resize(begin + count);
+    if (count == 0) break;
+  }
+  return bytes;
+}
+
+/// The next archive. `begun`: frames came before it.
+VdbContents receive(int descriptor, const std::string& where, bool begun) {
+  std::string bytes = take(descriptor, where, archive_head_size);
+  if (bytes.empty()) {
+    throw DataError(
+        begun ? where + " ended before its closing frame: the run upstream failed or was stopped"
+              : where + " is empty: the run upstream failed, or nothing was piped in");
+  }
+  // Archives of other tools do not say how long they are: such a pipe holds one.
+  const std::size_t length = statedLength(bytes).value_or(std::numeric_limits<std::size_t>::max());
+  if (length > bytes.size()) bytes += take(descriptor, where, length - bytes.size());
+  return contentsOfBytes(bytes, where);
+}
 
 }  // namespace
 
@@ -52,43 +85,34 @@ void FrameWriter::send(const VdbContents& contents) {
   }
 }
 
-FrameReader::FrameReader(int descriptor, std::string where)
+FrameReader::FrameReader(int descriptor, const std::string& where)
+    : FrameReader(descriptor, where, receive(descriptor, where, false)) {}
+
+FrameReader::FrameReader(int descriptor, std::string where, VdbContents first)
     : descriptor_(descriptor), where_(std::move(where)) {
-  VdbContents contents = receive();
-  const auto frame = contents.metadata.extract(frame_key);
+  const auto frame = first.metadata.extract(frame_key);
   framed_ = !frame.empty();
   if (framed_ && frame.mapped() != "head")
     throw DataError(where_ + " does not begin with a head frame");
-  schema_ = schemaOf(contents, where_);
-  if (!framed_) foreign_ = Slab{schema_.lattice.layers(), schema_.lattice.layers(), contents.grids};
+  schema_ = schemaOf(first, where_);
+  if (!framed_) foreign_ = Slab{schema_.lattice.layers(), schema_.lattice.layers(), first.grids};
 }
 
-std::string FrameReader::take(std::size_t size) {
-  constexpr std::size_t chunk = 1 << 20;
-  std::string bytes;
-  // Room grows with what comes: a damaged length must not ask for all of memory.
-  while (bytes.size() < size) {
-    const std::size_t begin = bytes.size();
-    bytes.resize(begin + std::min(chunk, size - begin));
-    const std::size_t count =
-        readSome(descriptor_, bytes.data() + begin, bytes.size() - begin, where_);
-    bytes.resize(begin + count);
-    if (count == 0) break;
+VdbContents FrameReader::readWhole(int descriptor, const std::string& where) {
+  VdbContents first = receive(descriptor, where, false);
+  if (!first.metadata.contains(frame_key)) {
+    if (!take(descriptor, where, 1).empty())
+      throw DataError(where + " goes on behind its archive; pipe in one file at a time");
+    return first;
   }
-  return bytes;
-}
-
-VdbContents FrameReader::receive() {
-  std::string bytes = take(archive_head_size);
-  if (bytes.empty()) {
-    throw DataError(
-        framed_ ? where_ + " ended before its closing frame: the run upstream failed or was stopped"
-                : where_ + " is empty: the run upstream failed, or nothing was piped in");
-  }
-  // Archives of other tools do not say how long they are: such a pipe holds one.
-  const std::size_t length = statedLength(bytes).value_or(std::numeric_limits<std::size_t>::max());
-  if (length > bytes.size()) bytes += take(length - bytes.size());
-  return contentsOfBytes(bytes, where_);
+  FrameReader frames(descriptor, where, std::move(first));
+  std::map<std::string, std::vector<Layers>, std::less<>> pieces;
+  while (const std::optional<Slab> slab = frames.next())
+    for (const auto& [name, grid] : slab->grids) pieces[name].push_back({grid, slab->core});
+  VdbContents whole = contentsOf(frames.schema(), frames.schema().grids);
+  for (const auto& [name, layers] : pieces)
+    whole.grids[name] = pruned(joinLayers(layers, frames.schema().lattice.layers()));
+  return whole;
 }
 
 std::optional<Slab> FrameReader::next() {
@@ -97,7 +121,7 @@ std::optional<Slab> FrameReader::next() {
     ended_ = true;
     return std::exchange(foreign_, std::nullopt);
   }
-  VdbContents contents = receive();
+  VdbContents contents = receive(descriptor_, where_, true);
   std::istringstream words(contents.metadata[frame_key]);
   std::string kind;
   words >> kind;

@@ -32,7 +32,7 @@ class FrameWriter {
 class FrameReader {
  public:
   /// `where` names the pipe in messages. Throws DataError for anything that is no VDB stream.
-  FrameReader(int descriptor, std::string where);
+  FrameReader(int descriptor, const std::string& where);
 
   [[nodiscard]] const Schema& schema() const { return schema_; }
 
@@ -40,9 +40,13 @@ class FrameReader {
   /// or is damaged.
   std::optional<Slab> next();
 
+  /// All that comes, to its end: frames joined to what a file of them would hold, or the single
+  /// archive of another tool, whatever its transforms. Throws DataError like `next`.
+  static VdbContents readWhole(int descriptor, const std::string& where);
+
  private:
-  std::string take(std::size_t size);
-  VdbContents receive();
+  /// `first`: the archive that the pipe began with.
+  FrameReader(int descriptor, std::string where, VdbContents first);
 
   int descriptor_;
   std::string where_;

@@ -89,6 +89,7 @@ void SlabReader::openFile(const std::vector<std::string>& names) {
     schema_.leaves += leaves;
     schema_.leaves_per_row = std::max(schema_.leaves_per_row, leaves);
   }
+  schema_.surface_leaves = schema_.leaves;
   slabs_.push_back({held, held, std::move(contents.grids)});
 }
 

@@ -1,7 +1,12 @@
 #include "io/slice_runs.h"
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <memory>
 #include <utility>
@@ -47,6 +52,28 @@ const std::int32_t* planes(const openvdb::BoolTree::LeafNodeType& leaf, LeafValu
   return scratch.data();
 }
 
+/// A bit for every row of a plane whose values differ.
+std::uint64_t differing(const std::int32_t* a, const std::int32_t* b) {
+#ifdef __SSE2__
+  const auto equal = [&](int row) {
+    return _mm_cmpeq_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(a + row)),
+                           _mm_loadu_si128(reinterpret_cast<const __m128i*>(b + row)));
+  };
+  std::uint64_t rows = 0;
+  for (int row = 0; row < strip_rows; row += 16) {
+    const __m128i low = _mm_packs_epi32(equal(row), equal(row + 4));
+    const __m128i high = _mm_packs_epi32(equal(row + 8), equal(row + 12));
+    const auto bits = static_cast<std::uint16_t>(_mm_movemask_epi8(_mm_packs_epi16(low, high)));
+    rows |= std::uint64_t{bits} << row;
+  }
+  return ~rows;
+#else
+  std::uint64_t rows = 0;
+  for (int row = 0; row < strip_rows; ++row) rows |= std::uint64_t{a[row] != b[row]} << row;
+  return rows;
+#endif
+}
+
 /// Collects the runs of a strip from left to right.
 class StripBuilder {
  public:
@@ -66,13 +93,10 @@ class StripBuilder {
 
   /// From `column` on each row holds its own value.
   void plane(std::uint32_t column, const std::int32_t* values) {
-    for (int group = 0; group < strip_rows; group += leaf_layers) {
-      std::int32_t difference = 0;
-      for (int row = group; row < group + leaf_layers; ++row)
-        difference |= values[row] ^ values_[row];
-      if (!difference) continue;
+    for (std::uint64_t rows = differing(values, values_.data()); rows != 0; rows &= rows - 1) {
+      const int row = std::countr_zero(rows);
       uniform_ = false;
-      for (int row = group; row < group + leaf_layers; ++row) change(row, column, values[row]);
+      change(row, column, values[row]);
     }
   }
 
@@ -154,15 +178,21 @@ std::vector<RunImage> slice(const Grid& grid, const SliceFrame& frame, ZRange la
   const ZRange aligned = alignedToLeaves(layers);
   const int y_begin = frame.box.min().y() & ~(leaf_layers - 1);
   const int strip_count = (frame.box.max().y() - y_begin) / leaf_layers + 1;
-  std::vector<StripRuns> strips(strip_count);
+  // One over the other: tiles that are neighbours along z share a cache line.
+  std::vector<StripRuns> all_strips(static_cast<std::size_t>(aligned.size() / leaf_layers) *
+                                    strip_count);
+  const auto stripsAt = [&](int z) {
+    return std::span(all_strips)
+        .subspan(static_cast<std::size_t>((z - aligned.begin) / leaf_layers) * strip_count,
+                 strip_count);
+  };
+  tbb::parallel_for(0, strip_count, [&](int strip) {
+    StripBuilder builder;
+    for (int z = aligned.begin; z < aligned.end; z += leaf_layers)
+      stripsAt(z)[strip] = walkStrip(grid, frame, y_begin + strip * leaf_layers, z, builder);
+  });
   for (int z = aligned.begin; z < aligned.end; z += leaf_layers) {
-    tbb::parallel_for(
-        tbb::blocked_range<int>(0, strip_count, 4), [&](const tbb::blocked_range<int>& range) {
-          StripBuilder builder;
-          for (int strip = range.begin(); strip < range.end(); ++strip) {
-            strips[strip] = walkStrip(grid, frame, y_begin + strip * leaf_layers, z, builder);
-          }
-        });
+    const std::span<const StripRuns> strips = stripsAt(z);
     const ZRange here = intersection({z, z + leaf_layers}, layers);
     tbb::parallel_for(here.begin, here.end, [&](int layer) {
       RunImage& image = images[layer - layers.begin];

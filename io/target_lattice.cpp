@@ -1,5 +1,8 @@
 #include "io/target_lattice.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "io/printer_profile.h"
 #include "vdbdither/comma_list.h"
 #include "vdbdither/errors.h"
@@ -7,6 +10,8 @@
 
 namespace vdbdither {
 
+using openvdb::Coord;
+using openvdb::CoordBBox;
 using openvdb::Vec3d;
 
 Vec3d targetPitchMm(const std::string& printer, const std::string& pitch, Schema& schema) {
@@ -28,6 +33,27 @@ Vec3d targetPitchMm(const std::string& printer, const std::string& pitch, Schema
       throw UsageError("--pitch: '" + pitch + "' is not between 1 um and 10 mm in every axis");
   }
   return pitch_mm;
+}
+
+Lattice latticeAround(const Vec3d& min_mm, const Vec3d& max_mm, double margin_mm,
+                      const Vec3d& pitch_mm, int refine_y) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double furthest_mm = std::max(std::abs(min_mm[axis]), std::abs(max_mm[axis])) + margin_mm;
+    if (!(furthest_mm / pitch_mm[axis] * refine_y < 1e8))
+      throw DataError("the part reaches " + shortestText(furthest_mm) +
+                      " mm from the origin, more voxels than can be counted; check --unit and "
+                      "--scale");
+  }
+  Lattice lattice{pitch_mm, Vec3d(0, 0, 0),
+                  CoordBBox(Coord::floor((min_mm - margin_mm) / pitch_mm),
+                            Coord::ceil((max_mm + margin_mm) / pitch_mm))};
+  if (refine_y > 1) {
+    lattice.origin_mm.y() = -0.5 * pitch_mm.y() * (refine_y - 1) / refine_y;
+    lattice.pitch_mm.y() = pitch_mm.y() / refine_y;
+    lattice.box.min().y() *= refine_y;
+    lattice.box.max().y() = lattice.box.max().y() * refine_y + refine_y - 1;
+  }
+  return lattice;
 }
 
 }  // namespace vdbdither

@@ -15,7 +15,6 @@
 #include <openvdb/tools/ChangeBackground.h>
 
 #include "io/archive_digest.h"
-#include "io/pipe_input.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
 #include "vdbdither/options.h"
@@ -320,17 +319,6 @@ VdbContents readVdb(const std::filesystem::path& path) {
     throw DataError(quoted(path) + " is damaged: its checksum does not match; make it again");
   }
   return readStream(file, quoted(path));
-}
-
-VdbContents readVdbPipe(int descriptor, const std::string& where) {
-  std::string bytes;
-  std::vector<char> buffer(1 << 20);
-  for (;;) {
-    const std::size_t size = readSome(descriptor, buffer.data(), buffer.size(), where);
-    if (size == 0) break;
-    bytes.append(buffer.data(), size);
-  }
-  return contentsOfBytes(bytes, where);
 }
 
 GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name) {

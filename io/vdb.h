@@ -41,9 +41,6 @@ void writeVdb(const std::filesystem::path& path, const VdbContents& contents, Vd
 /// `path`.
 VdbContents readVdb(const std::filesystem::path& path);
 
-/// The same of a single archive that comes by a pipe, to its end.
-VdbContents readVdbPipe(int descriptor, const std::string& where);
-
 /// The grid called `name` of a file; any name where the file has only one grid. Throws DataError.
 GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name);
 

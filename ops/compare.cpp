@@ -61,7 +61,7 @@ class Compare : public Sink {
     for (const auto& [name, finding] : findings_) {
       if (finding.apart.empty()) us += 3 + 1e-3 * leafBytes(other_->schema().grids.at(name));
     }
-    return Work{.us_per_leaf = us};
+    return Work{.us_per_held_leaf = us};
   }
 
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {

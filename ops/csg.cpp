@@ -56,9 +56,10 @@ class CsgOperator : public Filter {
     for (const char* name : {"N", "closest"}) out.grids.erase(name);
     out.leaves_per_row += second.leaves_per_row;
     if (in.leaves == 0 || second.leaves == 0) {
-      out.leaves = 0;
+      out.leaves = out.surface_leaves = 0;
     } else {
       out.leaves += second.leaves;
+      out.surface_leaves += second.surface_leaves;
     }
     if (operation_ == Csg::unite) {
       out.lattice.box.expand(second.lattice.box);
@@ -78,7 +79,7 @@ class CsgOperator : public Filter {
 
   void drain() override { other_->drain(); }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 14}; }
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 14}; }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto surface = findGrid<FloatGrid>(in.grids, "surface");

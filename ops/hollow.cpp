@@ -55,7 +55,7 @@ class Hollow : public Filter {
 
   [[nodiscard]] std::vector<Read> reads() const override { return {{"surface", Reach::point()}}; }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 6}; }
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 6}; }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     return {{"surface", hollowed(*findGrid<FloatGrid>(in.grids, "surface"), lattice_, thickness_mm_,

@@ -126,7 +126,7 @@ class Info : public Sink {
     for (const auto& [name, grid] : in.grids) summaries_[name];
   }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 2}; }
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 2}; }
 
   void write(const Slab& in) override {
     for (auto& [name, summary] : summaries_) {

@@ -50,7 +50,7 @@ class Interlace : public Filter {
 
   [[nodiscard]] std::vector<Read> reads() const override { return {{"surface", Reach::point()}}; }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 1.6}; }
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 1.6}; }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto surface = findGrid<FloatGrid>(in.grids, "surface");

@@ -85,7 +85,7 @@ class Mask : public Source {
     schema.grids["mask"] = emptyGrid();
     const auto leaves = [](int voxels) { return (voxels + leaf_layers - 1) / leaf_layers; };
     schema.leaves_per_row = leaves(size.x()) * leaves(size.y());
-    schema.leaves = schema.leaves_per_row * leaves(size.z());
+    schema.leaves = schema.surface_leaves = schema.leaves_per_row * leaves(size.z());
     return schema;
   }
 

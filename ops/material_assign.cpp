@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include <openvdb/tree/LeafManager.h>
+#include <openvdb/tree/NodeManager.h>
 
 #include "io/material_table.h"
 #include "io/printer_profile.h"
@@ -19,6 +20,7 @@ namespace vdbdither {
 namespace {
 
 using openvdb::BoolGrid;
+using openvdb::BoolTree;
 using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::Int32Grid;
@@ -37,6 +39,29 @@ std::vector<std::string> entriesOf(const std::string& text) {
     }
   }
   return entries;
+}
+
+/// Gives every active voxel of a copied topology the value 1. OpenVDB's copy with two values asks
+/// each voxel of each leaf for its state.
+struct ActivesToOne {
+  template <typename Node>
+  void operator()(Node& node) const {
+    for (auto value = node.beginValueOn(); value; ++value) value.setValue(1);
+  }
+  void operator()(Int32Tree::LeafNodeType& leaf) const {
+    std::int32_t* values = leaf.buffer().data();
+    for (openvdb::Index x = 0; x < 8; ++x) {
+      const std::uint64_t word = leaf.getValueMask().getWord<std::uint64_t>(x);
+      for (unsigned n = 0; n < 64; ++n) *values++ = static_cast<std::int32_t>(word >> n & 1U);
+    }
+  }
+};
+
+Int32Tree::Ptr onesWhereActive(const BoolTree& solid) {
+  auto ones = std::make_shared<Int32Tree>(solid, 0, openvdb::TopologyCopy());
+  openvdb::tree::NodeManager<Int32Tree> nodes(*ones);
+  nodes.foreachTopDown(ActivesToOne());
+  return ones;
 }
 
 /// `material` from `solid`.
@@ -93,8 +118,7 @@ class MaterialAssign : public Filter {
       material = valueByDepth(*solid, lattice_.pitch_mm, lattice_.box, in.core, in.valid, bands_,
                               static_cast<std::int32_t>(table_.size()));
     } else {
-      material = Int32Grid::create(
-          std::make_shared<Int32Tree>(solid->tree(), 0, 1, openvdb::TopologyCopy()));
+      material = Int32Grid::create(onesWhereActive(solid->tree()));
       material->setTransform(solid->transform().copy());
       if (!parts_.empty())
         takeParts(material->tree(), findGrid<Int32Grid>(in.grids, "part")->tree());

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "io/mesh_reader.h"
 #include "io/printer_profile.h"
@@ -19,22 +18,7 @@ namespace vdbdither {
 
 namespace {
 
-using openvdb::Coord;
-using openvdb::CoordBBox;
 using openvdb::Vec3d;
-
-/// `meshes` in one, one after the other.
-Mesh joined(std::vector<Mesh> meshes) {
-  if (meshes.empty()) return {};
-  Mesh all = std::move(meshes.front());
-  for (auto mesh = meshes.begin() + 1; mesh != meshes.end(); ++mesh) {
-    const auto first = static_cast<std::uint32_t>(all.vertices.size());
-    all.vertices.insert(all.vertices.end(), mesh->vertices.begin(), mesh->vertices.end());
-    for (const Mesh::Triangle& t : mesh->triangles)
-      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
-  return all;
-}
 
 /// `surface` from triangle meshes.
 class MeshToSdf : public Source {
@@ -73,16 +57,12 @@ class MeshToSdf : public Source {
     place(mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
     questionSize(mesh, schema);
     const std::vector<Mesh> parts = closed(mesh);  // which a guess may make larger
-    schema.lattice = latticeAround(mesh, pitch_mm);
+    schema.lattice = latticeOfMesh(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
     for (const Mesh& part : parts)
       parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
     const SwallowedWalls hidden = wallsOf(mesh);
-    const auto triangles = static_cast<double>(mesh.triangles.size());
-    const std::vector<double> leaves = leavesOfRows(mesh, lattice);
-    triangles_per_leaf_ = triangles / leavesAtSurface(mesh, lattice);
-    schema.leaves_per_row = *std::max_element(leaves.begin(), leaves.end());
-    schema.leaves = std::accumulate(leaves.begin(), leaves.end(), 0.0);
+    countLeaves(mesh, schema);
     field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, hidden);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
@@ -99,7 +79,7 @@ class MeshToSdf : public Source {
     const double per_leaf =
         2 + 1.2 * triangles_per_leaf_ + (extras_.normals ? 8 : 0) + (extras_.closest ? 2 : 0);
     const double fields = parts_.empty() ? 1 : 2;
-    return Work{.us_per_leaf = fields * per_leaf};
+    return Work{.us_per_held_leaf = fields * per_leaf};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {
@@ -150,32 +130,55 @@ class MeshToSdf : public Source {
     return walls;
   }
 
-  /// Makes `mesh` bound a solid: by repair, or where triangles of a file enclose nothing by the
-  /// surface of what they hint at. Of several files also each by itself; what is repaired in them
-  /// is told of the whole.
+  /// A mesh that bounds a solid, and how it came to.
+  struct Closed {
+    Mesh mesh;
+    MeshRepairs repairs;
+    bool is_guess;
+  };
+
+  /// A file's mesh made to bound a solid: by repair, or where its triangles enclose nothing by the
+  /// surface of what they hint at.
+  Closed closedAlone(Mesh mesh) {
+    // Should the triangles prove loose, they are wanted as they came. Repair leaves the vertices
+    // and adds others behind them.
+    std::vector<Mesh::Triangle> given = mesh.triangles;
+    const std::size_t given_vertices = mesh.vertices.size();
+    Closed closed{{}, {}, false};
+    closed.mesh = repaired(std::move(mesh), closed.repairs);
+    const std::size_t triangles = closed.mesh.triangles.size();
+    closed.is_guess = closed.repairs.areOfLooseTriangles(triangles);
+    if (closed.is_guess) {
+      closed.mesh.triangles = std::move(given);
+      closed.mesh.vertices.resize(given_vertices);
+      closed.mesh = guessed(std::move(closed.mesh), triangles, closed.repairs);
+    }
+    return closed;
+  }
+
+  /// Makes `mesh` bound a solid. Of several files also each by itself; what is repaired in them is
+  /// told of the whole.
   std::vector<Mesh> closed(Mesh& mesh) {
+    if (paths_.size() == 1) {
+      Closed closed = closedAlone(std::move(mesh));
+      mesh = std::move(closed.mesh);
+      is_guess_ = closed.is_guess;
+      if (!is_guess_) repairs_ = closed.repairs;
+      return {};
+    }
     std::vector<Mesh> parts;
     std::vector<Mesh> meshes;
     std::vector<Mesh> guesses;
     for (Mesh& part : separated(mesh)) {
-      MeshRepairs repairs;
-      parts.push_back(repaired(part, repairs));
-      if (repairs.areOfLooseTriangles(parts.back().triangles.size())) {
-        parts.back() = guessed(std::move(part), parts.back().triangles.size(), repairs);
+      Closed closed = closedAlone(part);
+      parts.push_back(std::move(closed.mesh));
+      if (closed.is_guess) {
         guesses.push_back(parts.back());
-      } else if (paths_.size() == 1) {
-        repairs_ = repairs;
-        meshes.push_back(std::move(parts.back()));
       } else {
         meshes.push_back(std::move(part));
       }
     }
-    mesh = joined(std::move(meshes));
-    if (paths_.size() == 1) {
-      parts.clear();
-    } else {
-      mesh = repaired(std::move(mesh), repairs_);
-    }
+    mesh = repaired(joined(std::move(meshes)), repairs_);
     is_guess_ = mesh.triangles.empty() && !guesses.empty();
     guesses.insert(guesses.begin(), std::move(mesh));
     mesh = joined(std::move(guesses));
@@ -288,72 +291,53 @@ class MeshToSdf : public Source {
            shortestText(std::round(best_mm * 100) / 100) + " mm";
   }
 
-  /// The voxels within a voxel diagonal, or the band, of the mesh's bounding box; where y is
-  /// refined, the same region in finer voxels.
-  Lattice latticeAround(const Mesh& mesh, const Vec3d& pitch_mm) const {
+  /// The voxels within a voxel diagonal, or the band, of the mesh's bounding box.
+  [[nodiscard]] Lattice latticeOfMesh(const Mesh& mesh, const Vec3d& pitch_mm) const {
     const MeshBounds bounds = boundsOf(mesh);
     const double margin_mm = std::max(pitch_mm.length(), band_.greatestMm(pitch_mm));
-    for (int axis = 0; axis < 3; ++axis) {
-      const double furthest_mm =
-          std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) + margin_mm;
-      if (!(furthest_mm / pitch_mm[axis] * refine_y_ < 1e8))
-        throw DataError(
-            "the mesh reaches " + shortestText(furthest_mm) +
-            " mm from the origin, more voxels than can be counted; check --unit and --scale");
-    }
-    Lattice lattice{pitch_mm, Vec3d(0, 0, 0),
-                    CoordBBox(Coord::floor((bounds.min - margin_mm) / pitch_mm),
-                              Coord::ceil((bounds.max + margin_mm) / pitch_mm))};
-    if (refine_y_ > 1) {
-      // The centres of the finer voxels lie symmetrically about that of the one they replace.
-      lattice.origin_mm.y() = -0.5 * pitch_mm.y() * (refine_y_ - 1) / refine_y_;
-      lattice.pitch_mm.y() = pitch_mm.y() / refine_y_;
-      lattice.box.min().y() *= refine_y_;
-      lattice.box.max().y() = lattice.box.max().y() * refine_y_ + refine_y_ - 1;
-    }
-    return lattice;
-  }
-
-  /// How many leaves come within `band_mm` of a triangle, of the share that it has in a surface.
-  static double leavesNear(const Mesh& mesh, const Mesh::Triangle& t, const Vec3d& leaf_mm,
-                           double band_mm) {
-    const Vec3d& a = mesh.vertices[t[0]];
-    const Vec3d area = 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
-    // The region within the band of the triangle, widened by the leaf's own extent along its
-    // normal.
-    const double across = std::abs(area.x()) * leaf_mm.x() + std::abs(area.y()) * leaf_mm.y() +
-                          std::abs(area.z()) * leaf_mm.z();
-    return (2 * band_mm * area.length() + across) / leaf_mm.product();
-  }
-
-  /// How many leaves the surface itself meets.
-  static double leavesAtSurface(const Mesh& mesh, const Lattice& lattice) {
-    double leaves = 0;
-    for (const Mesh::Triangle& t : mesh.triangles)
-      leaves += leavesNear(mesh, t, lattice.pitch_mm * double{leaf_layers}, 0);
-    return leaves;
+    return latticeAround(bounds.min, bounds.max, margin_mm, pitch_mm, refine_y_);
   }
 
   /// Every leaf that the band meets, spread by the area of the surface over the rows that it
-  /// crosses.
-  std::vector<double> leavesOfRows(const Mesh& mesh, const Lattice& lattice) const {
+  /// crosses, and how many of them the surface itself does.
+  void countLeaves(const Mesh& mesh, Schema& schema) {
+    const Lattice& lattice = schema.lattice;
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
-    const auto rows = static_cast<std::size_t>(lattice.layers().size() / leaf_layers + 2);
     const double low = lattice.layers().begin * lattice.pitch_mm.z();
-    std::vector<double> leaves(rows + 1, 0.0);
     const double band_mm = band_.greatestMm(lattice.pitch_mm);
+    const int top_row = lattice.layers().size() / leaf_layers + 1;
+    std::vector<double> rows(static_cast<std::size_t>(top_row) + 1, 0.0);
+    const auto rowAt = [&](double z_mm) {
+      return static_cast<std::size_t>(
+          std::clamp((z_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(top_row)));
+    };
+    double area_mm2 = 0;
+    double across_mm3 = 0;  // swept by leaves that touch the surface
+    const auto leavesWithin = [&](double distance_mm, double area, double across) {
+      return (2 * distance_mm * area + across) / leaf_mm.product();
+    };
     for (const Mesh::Triangle& t : mesh.triangles) {
-      const double touched = leavesNear(mesh, t, leaf_mm, band_mm);
+      const Vec3d& a = mesh.vertices[t[0]];
+      const Vec3d facing = 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
+      const double area = facing.length();
+      // The leaf's own extent along the normal.
+      const double across = std::abs(facing.x()) * leaf_mm.x() +
+                            std::abs(facing.y()) * leaf_mm.y() + std::abs(facing.z()) * leaf_mm.z();
+      area_mm2 += area;
+      across_mm3 += across;
       const auto [z_low, z_high] =
           std::minmax({mesh.vertices[t[0]].z(), mesh.vertices[t[1]].z(), mesh.vertices[t[2]].z()});
-      const auto first = static_cast<std::size_t>(
-          std::clamp((z_low - band_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
-      const auto last = static_cast<std::size_t>(
-          std::clamp((z_high + band_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(rows - 1)));
+      const std::size_t first = rowAt(z_low - band_mm);
+      const std::size_t last = rowAt(z_high + band_mm);
       for (std::size_t row = first; row <= last; ++row)
-        leaves[row] += touched / static_cast<double>(last - first + 1);
+        rows[row] += leavesWithin(band_mm, area, across) / static_cast<double>(last - first + 1);
     }
-    return leaves;
+    triangles_per_leaf_ =
+        static_cast<double>(mesh.triangles.size()) / leavesWithin(0, area_mm2, across_mm3);
+    schema.leaves_per_row = *std::max_element(rows.begin(), rows.end());
+    schema.leaves = leavesWithin(band_mm, area_mm2, across_mm3);
+    schema.surface_leaves =
+        leavesWithin(std::min(band_mm, lattice.pitch_mm.length()), area_mm2, across_mm3);
   }
 
   [[nodiscard]] Grids gridsOf(const DistanceGrids& made) const {

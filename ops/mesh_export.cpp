@@ -39,7 +39,7 @@ class MeshExport : public Sink {
     if (!level_.empty()) level = parseLengthMm(level_);
     surface_.emplace(in.lattice, *in.grids.at(name_), level);
     MeshWriter::check(file_, overwrite_);
-    leaves_ = in.leaves;
+    leaves_ = in.surface_leaves;
   }
 
   [[nodiscard]] std::optional<Work> work() const override {

@@ -36,7 +36,7 @@ class ReadOperator : public Source {
     constexpr double us_per_byte = 1.4e-3;
     double bytes = 0;
     for (const auto& [name, grid] : reader_->schema().grids) bytes += leafBytes(grid);
-    return Work{.us_per_leaf = us_per_byte * bytes};
+    return Work{.us_per_held_leaf = us_per_byte * bytes};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override { return reader_->run(core); }

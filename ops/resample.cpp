@@ -1,14 +1,15 @@
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <unistd.h>
 
 #include <tbb/parallel_reduce.h>
 
+#include "io/frames.h"
 #include "io/target_lattice.h"
 #include "io/vdb.h"
 #include "ops/kernels/held_band.h"
+#include "ops/kernels/mesh_placement.h"
 #include "ops/kernels/zero_set_distance.h"
 #include "vdbdither/errors.h"
 #include "vdbdither/openvdb.h"
@@ -18,14 +19,9 @@ namespace vdbdither {
 
 namespace {
 
-using openvdb::Coord;
-using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::Mat4d;
 using openvdb::Vec3d;
-
-constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{
-    {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}, {"um", 0.001}}};
 
 FloatGrid::ConstPtr asFloats(const GridConstPtr& grid) {
   if (auto floats = openvdb::gridConstPtrCast<FloatGrid>(grid)) return floats;
@@ -88,9 +84,13 @@ class Resample : public Source {
     if (band_mm_ < 0) throw UsageError("--band: is below zero");
     const FloatGrid::ConstPtr grid = readSurface(schema);
     surface_ = zeroSet(grid, pitch_mm);
-    schema.lattice = latticeAround(surface_->bounds(), pitch_mm);
+    const ZeroSet::Bounds bounds = surface_->bounds();
+    schema.lattice =
+        latticeAround(bounds.min, bounds.max, std::max(pitch_mm.length(), band_mm_), pitch_mm);
     const Band band{1, band_mm_};
-    schema.leaves = leavesOf(schema.lattice, band);
+    schema.leaves = leavesOf(schema.lattice, band.greatestMm(pitch_mm));
+    schema.surface_leaves =
+        leavesOf(schema.lattice, std::min(band.greatestMm(pitch_mm), pitch_mm.length()));
     // As if the surface were spread evenly over the layers but for a factor of two.
     schema.leaves_per_row =
         2 * schema.leaves / (schema.lattice.layers().size() / static_cast<double>(leaf_layers) + 1);
@@ -103,7 +103,7 @@ class Resample : public Source {
 
   [[nodiscard]] double memoryBytes() const override { return surface_->memoryBytes(); }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 400}; }
+  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 400}; }
 
   [[nodiscard]] Grids run(ZRange core) const override {
     const FloatGrid::Ptr surface = field_->run(core);
@@ -118,7 +118,7 @@ class Resample : public Source {
     if (isPipe() && ::isatty(STDIN_FILENO))
       throw UsageError("nothing is piped in; name a file: resample part.vdb");
     const VdbContents contents =
-        isPipe() ? readVdbPipe(STDIN_FILENO, "standard input") : readVdb(path_);
+        isPipe() ? FrameReader::readWhole(STDIN_FILENO, "standard input") : readVdb(path_);
     if (const auto history = contents.metadata.find("vdbdither:history");
         history != contents.metadata.end()) {
       schema.metadata.insert(*history);
@@ -183,10 +183,8 @@ class Resample : public Source {
   }
 
   std::shared_ptr<const ZeroSet> zeroSet(const FloatGrid::ConstPtr& grid, const Vec3d& pitch_mm) {
-    const auto unit = std::find_if(units_mm.begin(), units_mm.end(),
-                                   [this](const auto& known) { return known.first == unit_; });
     Mat4d map = grid->transform().baseMap()->getAffineMap()->getMat4();
-    map.postScale(Vec3d(unit->second * scale_));
+    map.postScale(Vec3d(unitMm(unit_) * scale_));
     if (!(std::abs(map.det()) > 0))
       throw DataError("grid '" + grid_name_ + "' has a transform without volume");
     const ZeroSet::Reading reading = readingOf(*grid);
@@ -215,27 +213,12 @@ class Resample : public Source {
     return made(map);
   }
 
-  [[nodiscard]] Lattice latticeAround(const ZeroSet::Bounds& bounds, const Vec3d& pitch_mm) const {
-    const double margin_mm = std::max(pitch_mm.length(), band_mm_);
-    for (int axis = 0; axis < 3; ++axis) {
-      const double furthest_mm =
-          std::max(std::abs(bounds.min[axis]), std::abs(bounds.max[axis])) + margin_mm;
-      if (!(furthest_mm / pitch_mm[axis] < 1e8))
-        throw DataError("the part reaches " + shortestText(furthest_mm) +
-                        " mm from the origin, more voxels than can be counted; check --unit and "
-                        "--scale");
-    }
-    return {pitch_mm, Vec3d(0, 0, 0),
-            CoordBBox(Coord::floor((bounds.min - margin_mm) / pitch_mm),
-                      Coord::ceil((bounds.max + margin_mm) / pitch_mm))};
-  }
-
-  [[nodiscard]] double leavesOf(const Lattice& lattice, const Band& band) const {
+  [[nodiscard]] double leavesOf(const Lattice& lattice, double band_mm) const {
     // Three divisions are passed where the area is that of the faces of two.
     const double area = surface_->cells() * division_mm2_ / 1.5;
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
     const double across_mm = 0.5 * (leaf_mm.x() + leaf_mm.y() + leaf_mm.z());
-    return area * (2 * band.greatestMm(lattice.pitch_mm) + across_mm) / leaf_mm.product();
+    return area * (2 * band_mm + across_mm) / leaf_mm.product();
   }
 
   std::string path_;

@@ -109,14 +109,15 @@ class SliceExport : public Sink {
   [[nodiscard]] OutputEstimate output() const override {
     // Measured on dithered spheres, per leaf at the surface and per slice. A file of a folder
     // wastes half a block of the disk.
-    if (schema_.leaves == 0) return {folder_, 0};
+    if (schema_.surface_leaves == 0) return {folder_, 0};
     const double stacks = oneStackEach() ? static_cast<double>(materials_.size()) : 1;
     const double per_leaf = format_ == "png"    ? 125
                             : format_ == "tiff" ? 250
                             : format_ == "exr"  ? 1300
                                                 : 80 * stacks;
     const double per_slice = 500 + (folder_.ends_with(".zip") ? 0 : 2048 * stacks);
-    return {folder_, schema_.leaves * per_leaf + schema_.lattice.layers().size() * per_slice};
+    return {folder_,
+            schema_.surface_leaves * per_leaf + schema_.lattice.layers().size() * per_slice};
   }
 
   [[nodiscard]] std::optional<Work> work() const override {

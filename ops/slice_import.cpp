@@ -254,7 +254,8 @@ class SliceImport : public Source {
     // A surface that leans crosses more leaves of a row than of one of its layers.
     constexpr double lean = 1.3;
     schema.leaves_per_row *= lean;
-    schema.leaves = lean * sum / taken * schema.lattice.layers().size() / leaf_layers;
+    schema.leaves = schema.surface_leaves =
+        lean * sum / taken * schema.lattice.layers().size() / leaf_layers;
   }
 
   /// The squares of eight by eight pixels that some run ends in.

@@ -84,7 +84,7 @@ class WriteOperator : public Sink {
     constexpr double us_per_byte = 4e-3;
     double bytes = 0;
     for (const auto& [name, grid] : schema_.grids) bytes += leafBytes(grid);
-    return Work{.us_per_leaf = us_per_byte * bytes};
+    return Work{.us_per_held_leaf = us_per_byte * bytes};
   }
   [[nodiscard]] bool writesToStandardOutput() const override { return isPipe(); }
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <vector>
 
 #include <openvdb/tools/Prune.h>
+#include <tbb/parallel_for.h>
 
 #include "vdbdither/openvdb.h"
 #include "vdbdither/visit_grid.h"
@@ -62,6 +64,7 @@ class LayerCopy {
         fill(tile.getCoord(), root.getLevel(), tile.getValue(), tile.isValueOn());
     }
     for (auto child = root.cbeginChildOn(); child; ++child) copyNode(*child);
+    copyLeaves();
   }
 
  private:
@@ -75,7 +78,7 @@ class LayerCopy {
     };
     forEachEntry(node, range_, copy_tile, [&](const auto& child) {
       if constexpr (Node::LEVEL == 1) {
-        copyLeaf(child);
+        leaves_.push_back(&child);
       } else {
         copyNode(child);
       }
@@ -107,21 +110,43 @@ class LayerCopy {
 
   /// Makes background of the layers outside `range_`.
   void cut(Leaf& leaf) const {
-    for (openvdb::Index offset = 0; offset < Leaf::SIZE; ++offset) {
-      if (!range_.contains(leaf.offsetToGlobalCoord(offset).z()))
-        leaf.setValueOff(offset, target_.background());
+    const int bottom = leaf.origin().z();
+    const int begin = std::clamp(range_.begin - bottom, 0, leaf_layers);
+    const int end = std::clamp(range_.end - bottom, begin, leaf_layers);
+    const auto makeBackground = [&](const auto& set) {
+      for (int row = 0; row < static_cast<int>(Leaf::SIZE); row += leaf_layers) {
+        for (int n = row; n < row + begin; ++n) set(static_cast<openvdb::Index>(n));
+        for (int n = row + end; n < row + leaf_layers; ++n) set(static_cast<openvdb::Index>(n));
+      }
+    };
+    const Value background = target_.background();
+    openvdb::util::NodeMask<Leaf::LOG2DIM> active = leaf.getValueMask();
+    const std::uint64_t kept = 0x0101010101010101U * ((1U << end) - (1U << begin));
+    for (openvdb::Index x = 0; x < 8; ++x) active.template getWord<std::uint64_t>(x) &= kept;
+    leaf.setValueMask(active);
+    if constexpr (std::is_same_v<decltype(leaf.buffer().data()), Value*>) {
+      Value* values = leaf.buffer().data();
+      makeBackground([&](openvdb::Index n) { values[n] = background; });
+    } else {
+      makeBackground([&](openvdb::Index n) { leaf.setValueOff(n, background); });
     }
   }
 
-  void copyLeaf(const Leaf& leaf) {
-    const ZRange layers = layersOf(leaf.getNodeBoundingBox());
-    if (intersection(layers, range_).empty()) return;
+  [[nodiscard]] std::unique_ptr<Leaf> copyOf(const Leaf& leaf) const {
     auto copy = std::make_unique<Leaf>(leaf);
-    if (!within(layers, range_)) {
+    if (!within(layersOf(leaf.getNodeBoundingBox()), range_)) {
       cut(*copy);
-      if (copy->isEmpty() && allBackground(*copy)) return;
+      if (copy->isEmpty() && allBackground(*copy)) return nullptr;
     }
-    accessor_.addLeaf(copy.release());
+    return copy;
+  }
+
+  void copyLeaves() {
+    std::vector<std::unique_ptr<Leaf>> copies(leaves_.size());
+    tbb::parallel_for(std::size_t{0}, leaves_.size(),
+                      [&](std::size_t n) { copies[n] = copyOf(*leaves_[n]); });
+    for (auto& copy : copies)
+      if (copy) accessor_.addLeaf(copy.release());
   }
 
   bool allBackground(const Leaf& leaf) const {
@@ -134,6 +159,7 @@ class LayerCopy {
   TreeT& target_;
   openvdb::tree::ValueAccessor<TreeT, false> accessor_;
   ZRange range_;
+  std::vector<const Leaf*> leaves_;  ///< those in the range
 };
 
 /// Copies the layers of all `pieces` within `wanted` into a grid of their type that has nothing

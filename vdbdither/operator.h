@@ -45,9 +45,10 @@ class Reporter {
 };
 
 /// What an operator's computing costs, as CPU time of one thread of the machine it was measured on
-/// (docs/performance.md). A leaf is one that the surface crosses.
+/// (docs/performance.md).
 struct Work {
-  double us_per_leaf = 0;
+  double us_per_leaf = 0;       ///< of those at the surface
+  double us_per_held_leaf = 0;  ///< of all, for who looks at every distance of the band
   double us_per_layer = 0;
   double seconds = 0;  ///< once, whatever the layers
 };

@@ -225,10 +225,13 @@ class Pipeline::Stage : public Reporter {
   void expectWork(const Schema& through, int count_of_layers) {
     const std::optional<Work> work = operator_->work();
     const int all = through.lattice.layers().size();
-    if (!work || all == 0 || (work->us_per_leaf > 0 && through.leaves == 0)) return;
+    if (!work || all == 0) return;
+    const bool counts_leaves = work->us_per_leaf > 0 || work->us_per_held_leaf > 0;
+    if (counts_leaves && through.leaves == 0) return;
+    const double leaves_us =
+        work->us_per_leaf * through.surface_leaves + work->us_per_held_leaf * through.leaves;
     report_.expected_cpu_seconds =
-        work->seconds +
-        1e-6 * count_of_layers * (work->us_per_layer + work->us_per_leaf * through.leaves / all);
+        work->seconds + 1e-6 * count_of_layers * (work->us_per_layer + leaves_us / all);
   }
   [[nodiscard]] std::string inputFile() const {
     return inStage(name(), [&] { return operator_->inputFile(); });

@@ -93,18 +93,17 @@ openvdb::Vec3SGrid::Ptr outwardNormals(const openvdb::FloatGrid& surface,
   addLeaves(grid->tree(), leavesIn(surface.tree(), core), [&] {
     return [core,
             normals = LeafNormals(surface.tree(), pitch_mm, valid)](const FloatLeaf& leaf) mutable {
-      const std::uint8_t within = rowWithin(leaf.origin().z(), core);
-      openvdb::util::NodeMask<3> active = leaf.getValueMask();
-      for (unsigned x = 0; x < 8; ++x) active.getWord<std::uint64_t>(x) &= everyRow(within);
-      if (active.isOff()) return std::unique_ptr<NormalLeaf>();
+      const LeafBits bits = activeBits(leaf, rowWithin(leaf.origin().z(), core));
+      if (bits == no_bits) return std::unique_ptr<NormalLeaf>();
 
-      normals.visit(leaf);
+      normals.visit(leaf, bits);
+      openvdb::util::NodeMask<3> active;
+      for (unsigned x = 0; x < 8; ++x) active.getWord<std::uint64_t>(x) = bits[x];
       auto made = std::make_unique<NormalLeaf>(leaf.origin(), Vec3s(0.0F));
       made->setValueMask(active);
       Vec3s* out = made->buffer().data();
       for (unsigned offset = 0; offset < 512; offset += 8) {
-        const auto row =
-            static_cast<std::uint8_t>(active.getWord<std::uint64_t>(offset / 64) >> (offset % 64));
+        const auto row = static_cast<std::uint8_t>(bits[offset / 64] >> (offset % 64));
         if (row == 0) continue;
         const LeafNormals::Row normal = normals.row(offset);
         for (unsigned z = 0; z < 8; ++z) {

@@ -23,14 +23,14 @@ class LeafNormals {
   /// `surface`: distances in mm, < 0 inside. `valid`: layers outside it count as inactive.
   LeafNormals(const openvdb::FloatTree& surface, const openvdb::Vec3d& pitch_mm, ZRange valid);
 
-  /// Turns to the voxels of `leaf`, a leaf of `surface`.
-  void visit(const FloatLeaf& leaf) { around_.visit(leaf); }
+  /// Turns to the `wanted` voxels of `leaf`, a leaf of `surface`.
+  void visit(const FloatLeaf& leaf, const LeafBits& wanted) { around_.visit(leaf, wanted); }
 
-  /// The normal of the active voxel at `offset` in the leaf.
+  /// The normal of the active voxel at `offset` in the leaf, a wanted one.
   [[nodiscard]] openvdb::Vec3s normal(unsigned offset) const;
 
-  /// The normals of the eight voxels from `offset` on, a row along z, by component. Those of
-  /// inactive voxels mean nothing.
+  /// The normals of the eight voxels from `offset` on, a row along z that holds a wanted one, by
+  /// component. Those of inactive voxels mean nothing.
   using Row = std::array<std::array<float, 8>, 3>;
   [[nodiscard]] Row row(unsigned offset) const;
 

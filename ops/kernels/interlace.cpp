@@ -1,6 +1,9 @@
 #include "ops/kernels/interlace.h"
 
-#include <set>
+#include <algorithm>
+#include <vector>
+
+#include <tbb/parallel_for.h>
 
 #include "ops/kernels/leaf_bits.h"
 #include "ops/kernels/solid.h"
@@ -36,37 +39,74 @@ std::uint32_t pickedRows(std::uint64_t refined) {
   return picked;
 }
 
+/// The plain leaf that a refined one falls into; refined leaves come in pairs along y.
+Coord plainOrigin(const Coord& refined) {
+  return {refined.x(), (refined.y() >> 4) * leaf_layers, refined.z()};
+}
+
+/// What tiles of the refined lattice are inside, on the plain one.
+struct PlainTiles {
+  std::vector<CoordBBox> whole;
+  std::vector<Coord> leaves;  ///< origins of those of which one half alone is known to be inside
+};
+
+PlainTiles plainTiles(const FloatTree& refined, ZRange core) {
+  PlainTiles plain;
+  Accessor surface(refined);
+  const auto isInsideTile = [&](const Coord& origin) {
+    return !surface.probeConstLeaf(origin) && surface.getValue(origin) < 0.0F;
+  };
+  for (CoordBBox box : insideTiles(refined, core)) {
+    const Coord first(box.min().x(), box.min().y(), box.min().z() & ~(leaf_layers - 1));
+    const bool is_lower = (first.y() & leaf_layers) == 0;
+    const bool is_pair = box.dim().y() > leaf_layers;
+    box.min().y() = plainOrigin(first).y();
+    box.max().y() = is_pair ? box.max().y() >> 1 : box.min().y() + leaf_layers - 1;
+    if (is_pair) {
+      plain.whole.push_back(box);
+      continue;
+    }
+    int top = box.min().z() - 1;  // of the last box
+    for (Coord leaf = first; leaf.z() <= box.max().z(); leaf.z() += leaf_layers) {
+      if (!isInsideTile(leaf.offsetBy(0, is_lower ? leaf_layers : -leaf_layers, 0))) {
+        plain.leaves.push_back(plainOrigin(leaf));
+      } else if (is_lower) {
+        if (leaf.z() != top + 1 || leaf.z() <= box.min().z()) {
+          plain.whole.push_back(box);
+          plain.whole.back().min().z() = std::max(box.min().z(), leaf.z());
+        }
+        top = std::min(box.max().z(), leaf.z() + leaf_layers - 1);
+        plain.whole.back().max().z() = top;
+      }
+    }
+  }
+  return plain;
+}
+
 }  // namespace
 
 openvdb::BoolGrid::Ptr interlacedByPicking(const openvdb::FloatGrid& refined, ZRange core,
                                            const openvdb::math::Transform& transform) {
-  // The plain leaves that a refined leaf falls into; refined leaves come in pairs along y.
-  const auto plainOrigin = [](const Coord& origin) {
-    return Coord(origin.x(), (origin.y() >> 4) * 8, origin.z());
-  };
-  std::set<Coord> origins;
+  PlainTiles tiles = plainTiles(refined.tree(), core);
+  std::vector<Coord>& origins = tiles.leaves;
   for (const FloatLeaf* leaf : leavesIn(refined.tree(), core))
-    origins.insert(plainOrigin(leaf->origin()));
+    origins.push_back(plainOrigin(leaf->origin()));
+  std::sort(origins.begin(), origins.end());
+  origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
 
-  std::vector<SolidLeaf> printed;
-  Accessor surface(refined.tree());
-  for (const Coord& origin : origins) {
-    const Coord lower(origin.x(), 2 * origin.y(), origin.z());
-    const LeafBits rows0 = insideBitsAt(surface, lower, core);
-    const LeafBits rows4 = insideBitsAt(surface, lower.offsetBy(0, 8, 0), core);
-    SolidLeaf leaf{origin, {}};
-    for (unsigned x = 0; x < 8; ++x) {
-      leaf.inside[x] = pickedRows(rows0[x]) | std::uint64_t{pickedRows(rows4[x])} << 32;
+  std::vector<SolidLeaf> printed(origins.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size()), [&](const auto& range) {
+    Accessor surface(refined.tree());
+    for (std::size_t n = range.begin(); n != range.end(); ++n) {
+      const Coord lower(origins[n].x(), 2 * origins[n].y(), origins[n].z());
+      const LeafBits rows0 = insideBitsAt(surface, lower, core);
+      const LeafBits rows4 = insideBitsAt(surface, lower.offsetBy(0, leaf_layers, 0), core);
+      printed[n].origin = origins[n];
+      for (unsigned x = 0; x < 8; ++x)
+        printed[n].inside[x] = pickedRows(rows0[x]) | std::uint64_t{pickedRows(rows4[x])} << 32;
     }
-    printed.push_back(leaf);
-  }
-
-  std::vector<CoordBBox> boxes = insideTiles(refined.tree(), core);
-  for (CoordBBox& box : boxes) {
-    box.min().y() >>= 1;
-    box.max().y() >>= 1;
-  }
-  return makeSolidGrid(transform, printed, boxes);
+  });
+  return makeSolidGrid(transform, printed, tiles.whole);
 }
 
 openvdb::BoolGrid::Ptr interlacedByInterpolation(const openvdb::FloatGrid& surface, ZRange core) {

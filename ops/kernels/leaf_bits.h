@@ -74,13 +74,20 @@ inline LeafBits insideBits(const FloatLeaf& leaf, std::uint8_t row) {
   return bits;
 }
 
+/// The active voxels of the rows that `row` lets through.
+inline LeafBits activeBits(const FloatLeaf& leaf, std::uint8_t row) {
+  LeafBits bits;
+  for (unsigned x = 0; x < 8; ++x)
+    bits[x] = leaf.getValueMask().getWord<std::uint64_t>(x) & everyRow(row);
+  return bits;
+}
+
 /// The active voxels with |d| ≤ `bound`, of the rows that `row` lets through.
 inline LeafBits bandBits(const FloatLeaf& leaf, float bound, std::uint8_t row) {
   const float* values = leaf.buffer().data();
   const float beyond = std::nextafter(bound, std::numeric_limits<float>::infinity());
-  LeafBits bits;
+  LeafBits bits = activeBits(leaf, row);
   for (unsigned x = 0; x < 8; ++x, values += 64) {
-    bits[x] = leaf.getValueMask().getWord<std::uint64_t>(x) & everyRow(row);
     if (bits[x] != 0) bits[x] &= wordBelow(values, beyond) & ~wordBelow(values, -bound);
   }
   return bits;

@@ -25,6 +25,8 @@ using Doubles = double __attribute__((vector_size(32), may_alias));
 using Floats = float __attribute__((vector_size(16), may_alias));
 using Integers = std::int32_t __attribute__((vector_size(16), may_alias));
 using Halves = std::int64_t __attribute__((vector_size(16), may_alias));
+using Row = float __attribute__((vector_size(32), may_alias, aligned(16)));
+using RowBits = std::int32_t __attribute__((vector_size(32), may_alias, aligned(16)));
 
 constexpr int lanes = 4;
 constexpr Doubles ramp{0, 1, 2, 3};
@@ -284,41 +286,33 @@ template <int rank, bool track>
   }
 }
 
-/// The sign bits of four voxels, by the bits of those that are inside.
-constexpr std::array<std::array<std::int32_t, lanes>, 16> signs = [] {
-  std::array<std::array<std::int32_t, lanes>, 16> made{};
-  for (unsigned bits = 0; bits < 16; ++bits)
-    for (unsigned lane = 0; lane < lanes; ++lane)
-      if (bits >> lane & 1) made[bits][lane] = std::numeric_limits<std::int32_t>::min();
-  return made;
-}();
-
 [[gnu::always_inline]] inline LeafBits finishAll(const float* distances, const LeafBits& inside,
                                                  const LeafBits& exists, float limit_mm,
                                                  float background_mm, float* values) {
-  const Floats background = Floats{} + background_mm;
+  constexpr RowBits bit{1, 2, 4, 8, 16, 32, 64, 128};
+  const Row background = Row{} + background_mm;
   LeafBits active;
   for (std::size_t plane = 0; plane < edge; ++plane) {
     std::uint64_t found = 0;
-    for (int v = 0; v < edge * edge; v += lanes) {
-      const int offset = static_cast<int>(plane) * edge * edge + v;
-      const auto& distance = *reinterpret_cast<const Floats*>(distances + offset);
-      Integers on = distance < limit_mm;
-      if (exists[plane] != ~0ULL)
-        for (int lane = 0; lane < lanes; ++lane)
-          if (!(exists[plane] >> (v + lane) & 1)) on[lane] = 0;
-      Floats value = on ? distance : background;
-      reinterpret_cast<Integers&>(value) |=
-          reinterpret_cast<const Integers&>(signs[inside[plane] >> v & 15]);
-      *reinterpret_cast<Floats*>(values + offset) = value + 0.0F;  // no negative zero
+    for (int row = 0; row < edge * edge; row += edge) {
+      const std::size_t offset = plane * edge * edge + static_cast<std::size_t>(row);
+      const Row& distance = *reinterpret_cast<const Row*>(distances + offset);
+      const RowBits on =
+          (distance < limit_mm) & ((static_cast<std::int32_t>(exists[plane] >> row) & bit) == bit);
+      Row value = on ? distance : background;
+      reinterpret_cast<RowBits&>(value) |=
+          ((static_cast<std::int32_t>(inside[plane] >> row) & bit) == bit) &
+          std::numeric_limits<std::int32_t>::min();
+      *reinterpret_cast<Row*>(values + offset) = value + 0.0F;  // no negative zero
 #ifdef __SSE2__
+      const auto* halves = reinterpret_cast<const __m128*>(&on);
       const auto marks =
-          static_cast<unsigned>(_mm_movemask_ps(reinterpret_cast<const __m128&>(on)));
+          static_cast<unsigned>(_mm_movemask_ps(halves[0]) | _mm_movemask_ps(halves[1]) << 4);
 #else
-      const Integers set = on & Integers{1, 2, 4, 8};
-      const auto marks = static_cast<unsigned>(set[0] | set[1] | set[2] | set[3]);
+      unsigned marks = 0;
+      for (int z = 0; z < edge; ++z) marks |= static_cast<unsigned>(on[z] & bit[z]);
 #endif
-      found |= std::uint64_t{marks} << v;
+      found |= std::uint64_t{marks} << row;
     }
     active[plane] = found;
   }

@@ -4,6 +4,8 @@
 #include <emmintrin.h>
 #endif
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -73,20 +75,39 @@ LeafSurroundings::Block LeafSurroundings::blockAt(const Coord& origin) {
   return {tile.data(), &all};
 }
 
-void LeafSurroundings::visit(const FloatLeaf& leaf) {
+void LeafSurroundings::visit(const FloatLeaf& leaf, const LeafBits& wanted) {
   const Coord origin = leaf.origin();
   tiles_.clear();
+
+  // The planes of equal x and of equal y that hold a wanted voxel, as bits.
+  unsigned planes_x = 0;
+  std::uint64_t rows = 0;
+  for (unsigned x = 0; x < 8; ++x) {
+    planes_x |= unsigned{wanted[x] != 0} << x;
+    rows |= wanted[x];
+  }
+  if (rows == 0) return;
+  struct Span {
+    int begin, end;  ///< halos included
+    [[nodiscard]] Span within(int step) const {
+      return {std::max(begin - 8 * step, 0), std::min(end - 8 * step, 8)};
+    }
+  };
+  const Span span_x{std::countr_zero(planes_x) - halo,
+                    static_cast<int>(std::bit_width(planes_x)) + halo};
+  const Span span_y{std::countr_zero(rows) / 8 - halo,
+                    (static_cast<int>(std::bit_width(rows)) + 7) / 8 + halo};
+
   for (const int step_x : {-1, 0, 1}) {
+    const Span of_x = span_x.within(step_x);
     for (const int step_y : {-1, 0, 1}) {
+      const Span of_y = span_y.within(step_y);
+      if (of_x.begin >= of_x.end || of_y.begin >= of_y.end) continue;
       const Block below = blockAt(origin.offsetBy(8 * step_x, 8 * step_y, -8));
       const Block middle = blockAt(origin.offsetBy(8 * step_x, 8 * step_y, 0));
       const Block above = blockAt(origin.offsetBy(8 * step_x, 8 * step_y, 8));
-
-      // Of the neighbours, the last two rows, all, or the first two; along z half of them.
-      const auto begin = [](int step) { return step < 0 ? 8 - halo : 0; };
-      const auto end = [](int step) { return step > 0 ? halo : 8; };
-      for (int x = begin(step_x); x < end(step_x); ++x) {
-        for (int y = begin(step_y); y < end(step_y); ++y) {
+      for (int x = of_x.begin; x < of_x.end; ++x) {
+        for (int y = of_y.begin; y < of_y.end; ++y) {
           float* row =
               &values_[static_cast<std::size_t>(indexOf(8 * step_x + x, 8 * step_y + y, 0))];
           below.copyHalf(row - 4, x, y, 4);
@@ -100,8 +121,8 @@ void LeafSurroundings::visit(const FloatLeaf& leaf) {
   // Where the valid layers begin or end within the leaves.
   for (int z = -halo; z < 8 + halo; ++z) {
     if (valid_.contains(origin.z() + z)) continue;
-    for (int x = -halo; x < 8 + halo; ++x) {
-      for (int y = -halo; y < 8 + halo; ++y)
+    for (int x = span_x.begin; x < span_x.end; ++x) {
+      for (int y = span_y.begin; y < span_y.end; ++y)
         values_[static_cast<std::size_t>(indexOf(x, y, z))] =
             std::numeric_limits<float>::infinity();
     }

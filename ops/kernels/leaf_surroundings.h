@@ -26,11 +26,12 @@ class LeafSurroundings {
   LeafSurroundings(const openvdb::FloatTree& surface, ZRange valid)
       : surface_(surface), valid_(valid) {}
 
-  /// Turns to the voxels of `leaf`, a leaf of `surface`.
-  void visit(const FloatLeaf& leaf);
+  /// Turns to voxels of `leaf`, a leaf of `surface`. Only of the rows along z that hold one of
+  /// `wanted`, and of those around them, is anything known then.
+  void visit(const FloatLeaf& leaf, const LeafBits& wanted);
 
-  /// Where the distance of the voxel at `offset` in the leaf is; its neighbours', up to `halo` away
-  /// along each axis, are at multiples of the strides.
+  /// Where the distance of the voxel at `offset` in the leaf is, one of a wanted row; its
+  /// neighbours', up to `halo` away along each axis, are at multiples of the strides.
   [[nodiscard]] const float* at(unsigned offset) const {
     const auto n = static_cast<int>(offset);
     return &values_[static_cast<std::size_t>(indexOf(n / 64, n / 8 % 8, n % 8))];

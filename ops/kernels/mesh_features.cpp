@@ -466,11 +466,18 @@ Vec3d MeshFeatures::leastNormal(std::uint32_t triangle) const {
   return least;
 }
 
-/// Of the triangles at an edge the one that comes first in the mesh given.
+/// One without area comes last: it has no normal.
+bool MeshFeatures::comesBefore(std::uint32_t one, std::uint32_t other) const {
+  const auto place = [&](std::uint32_t triangle) {
+    return std::pair(normals_[triangle] == Vec3d(0, 0, 0), original_[triangle]);
+  };
+  return place(one) < place(other);
+}
+
 std::uint32_t MeshFeatures::lowestAtEdge(std::uint32_t edge) const {
   const auto halves = edges_.halves(edge);
   return *std::min_element(halves.begin(), halves.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return original_[a / 3] < original_[b / 3];
+    return comesBefore(a / 3, b / 3);
   }) / 3;
 }
 
@@ -478,7 +485,7 @@ std::uint32_t MeshFeatures::lowestAtVertex(std::uint32_t vertex) const {
   std::uint32_t lowest = lowestAtEdge(vertex_edges_[first_edge_[vertex]]);
   for (std::uint32_t i = first_edge_[vertex] + 1; i < first_edge_[vertex + 1]; ++i) {
     const std::uint32_t other = lowestAtEdge(vertex_edges_[i]);
-    if (original_[other] < original_[lowest]) lowest = other;
+    if (comesBefore(other, lowest)) lowest = other;
   }
   return lowest;
 }

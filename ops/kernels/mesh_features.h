@@ -137,7 +137,8 @@ class MeshFeatures {
   /// What lies nearest to a point.
   struct Nearest {
     openvdb::Vec3d away;  ///< from there to the point
-    /// Of the triangles that the face, edge or vertex belongs to the one first in the mesh given.
+    /// Of the triangles that the face, edge or vertex belongs to the one first in the mesh given,
+    /// of those with area if there are any.
     std::uint32_t triangle;
   };
   /// Of the feature, whose region `p` is in.
@@ -169,6 +170,7 @@ class MeshFeatures {
 
   [[nodiscard]] double bendAtEdge(std::uint32_t edge) const;
   [[nodiscard]] double bendAtVertex(std::uint32_t vertex, const std::vector<float>& at_edge) const;
+  [[nodiscard]] bool comesBefore(std::uint32_t one, std::uint32_t other) const;
   [[nodiscard]] std::uint32_t lowestAtEdge(std::uint32_t edge) const;
   [[nodiscard]] std::uint32_t lowestAtVertex(std::uint32_t vertex) const;
   [[nodiscard]] MeshFeature describeFace(std::uint32_t triangle) const;

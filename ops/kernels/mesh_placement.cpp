@@ -41,6 +41,18 @@ MeshBounds boundsOf(const Mesh& mesh) {
   return bounds;
 }
 
+Mesh joined(std::vector<Mesh> meshes) {
+  if (meshes.empty()) return {};
+  Mesh all = std::move(meshes.front());
+  for (auto mesh = meshes.begin() + 1; mesh != meshes.end(); ++mesh) {
+    const auto first = static_cast<std::uint32_t>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), mesh->vertices.begin(), mesh->vertices.end());
+    for (const Mesh::Triangle& t : mesh->triangles)
+      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  return all;
+}
+
 void place(Mesh& mesh, const MeshPlacement& placement) {
   double factor = placement.factor;
   rotate(mesh, placement.rotate_degrees);

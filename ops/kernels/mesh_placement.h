@@ -3,6 +3,7 @@
 #include <array>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include <openvdb/Types.h>
 
@@ -15,6 +16,9 @@ struct MeshBounds {
   openvdb::Vec3d min, max;
 };
 MeshBounds boundsOf(const Mesh& mesh);
+
+/// `meshes` in one, one after the other.
+Mesh joined(std::vector<Mesh> meshes);
 
 /// How a mesh comes to where it is printed.
 struct MeshPlacement {

@@ -15,6 +15,7 @@
 
 #include "ops/kernels/hole_filling.h"
 #include "ops/kernels/mesh_edges.h"
+#include "ops/kernels/surface_error.h"
 #include "ops/kernels/winding_number.h"
 
 namespace vdbdither {
@@ -213,12 +214,8 @@ void turnInsideOut(Mesh& mesh, const std::vector<std::uint32_t>& part, MeshRepai
   }
   for (Part& own : parts) {
     const Vec3d centre = own.bounds.getCenter();
-    for (const std::uint32_t i : own.triangles) {
-      const Triangle& t = mesh.triangles[i];
-      own.volume += (mesh.vertices[t[0]] - centre)
-                        .dot((mesh.vertices[t[1]] - centre).cross(mesh.vertices[t[2]] - centre)) /
-                    6;
-    }
+    for (const std::uint32_t i : own.triangles)
+      own.volume += volumeFrom(centre, mesh, mesh.triangles[i]);
   }
   for (const Part& own : parts) {
     if (!(own.volume < 0)) continue;

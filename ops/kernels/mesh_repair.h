@@ -39,7 +39,8 @@ struct MeshRepairs {
 /// shared vertices need it); at borders also those within a micrometre. Degenerate and duplicate
 /// triangles go. Triangles are turned to agree with their neighbours, parts that are inside out and
 /// in no other part are turned, and loops of borders are filled; see hole_filling.h. Deterministic;
-/// the order of the triangles that stay is kept.
+/// the order of the triangles that stay is kept, and so are all vertices, behind which those of
+/// fillings come.
 ///
 /// `mesh` in mm.
 Mesh repaired(Mesh mesh, MeshRepairs& repairs);

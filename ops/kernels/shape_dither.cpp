@@ -54,15 +54,17 @@ class VoxelNormals {
     if (given) given_.emplace(*given);
   }
 
-  void visit(const FloatLeaf& leaf) {
+  /// Turns to the `wanted` voxels of `leaf`.
+  void visit(const FloatLeaf& leaf, const LeafBits& wanted) {
     leaf_ = &leaf;
+    wanted_ = wanted;
     visited_ = false;
     rows_made_ = 0;
   }
 
   /// The leaf's distances and those around it.
   const LeafSurroundings& around() {
-    if (!visited_) gradient_.visit(*leaf_);
+    if (!visited_) gradient_.visit(*leaf_, wanted_);
     visited_ = true;
     return gradient_.around();
   }
@@ -116,6 +118,7 @@ class VoxelNormals {
   std::optional<NormalAccessor> given_;
   openvdb::Vec3f per_pitch_;
   const FloatLeaf* leaf_ = nullptr;
+  LeafBits wanted_{};
   bool visited_ = false;
   std::uint64_t rows_made_ = 0;  ///< a bit for each row along z, in the order of the leaf
   std::array<std::array<float, 512>, 3> normals_{};
@@ -133,7 +136,7 @@ FloatTree surfaceDisplacements(const ShapeDither& dither, const FloatTree& surfa
       const LeafBits bits = surface_voxels(leaf);
       if (bits == no_bits) return std::unique_ptr<FloatLeaf>();
 
-      if (!given) gradient.visit(leaf);
+      if (!given) gradient.visit(leaf, bits);
       auto made = std::make_unique<FloatLeaf>(leaf.origin(), 0.0F);
       float greatest = 0;
       forEachBit(bits, [&](unsigned offset) {
@@ -279,24 +282,30 @@ ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
         const float* distances = leaf.buffer().data();
         const std::uint8_t within = rowWithin(leaf.origin().z(), core);
         FloatLeaf* moved = displaced ? displaced->tree().probeLeaf(leaf.origin()) : nullptr;
-        voxel_normals.visit(leaf);
         const float f_bound = f.visit(leaf);
         const float bound = moved ? std::numeric_limits<float>::infinity() : f_bound;
 
         LeafBits inside = insideBits(leaf, within);
         const LeafBits undecided = bandBits(leaf, bound, within);
+        voxel_normals.visit(leaf, undecided);
+        LeafBits overturned{};
         forEachBit(moved ? undecided : f.overturnable(undecided), [&](unsigned offset) {
           const float plain = distances[offset];
-          float d = plain + f(offset, plain);
-          if (guarded && (d < 0) != (plain < 0) &&
-              !guard.allows(voxel_normals.around(), leaf.origin(), offset, voxel_normals(offset),
-                            plain)) {
-            d = plain;
-          }
-          const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
-          inside[offset / 64] = d < 0 ? inside[offset / 64] | bit : inside[offset / 64] & ~bit;
+          const float d = plain + f(offset, plain);
+          overturned[offset / 64] |= std::uint64_t{(d < 0) != (plain < 0)} << (offset % 64);
           if (moved) moved->setValueOnly(offset, d);
         });
+        if (guarded) {
+          forEachBit(overturned, [&](unsigned offset) {
+            const float plain = distances[offset];
+            if (guard.allows(voxel_normals.around(), leaf.origin(), offset, voxel_normals(offset),
+                             plain))
+              return;
+            overturned[offset / 64] &= ~(std::uint64_t{1} << (offset % 64));
+            if (moved) moved->setValueOnly(offset, plain);
+          });
+        }
+        for (unsigned x = 0; x < 8; ++x) inside[x] ^= overturned[x];
         printed[n] = {leaf.origin(), inside};
       }
     });

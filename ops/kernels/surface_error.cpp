@@ -117,12 +117,7 @@ double volumeOf(const Mesh& mesh) {
   // From a corner of the mesh, so that a far origin costs no digits.
   const Vec3d from = mesh.vertices.empty() ? Vec3d(0.0) : mesh.vertices.front();
   double sum = 0;
-  for (const Mesh::Triangle& t : mesh.triangles) {
-    const Vec3d a = mesh.vertices[t[0]] - from;
-    const Vec3d b = mesh.vertices[t[1]] - from;
-    const Vec3d c = mesh.vertices[t[2]] - from;
-    sum += a.dot(b.cross(c)) / 6;
-  }
+  for (const Mesh::Triangle& t : mesh.triangles) sum += volumeFrom(from, mesh, t);
   return sum;
 }
 

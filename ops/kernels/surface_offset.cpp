@@ -148,7 +148,7 @@ FloatGrid::Ptr SurfaceOffset::run(const FloatGrid& surface, const FloatGrid* hei
       const FloatLeaf* leaf = nullptr;
       void visit(const FloatLeaf& next) {
         leaf = &next;
-        normals.visit(next);
+        normals.visit(next, activeBits(next, 0xff));
       }
       double operator()(unsigned n, float d) {
         const Vec3d normal(normals.normal(n));

@@ -121,9 +121,37 @@ struct Plane {
 
 using Polygon = std::vector<Vec3d>;
 
+/// Triangles that hang together, each group known by its lowest.
+class Groups {
+ public:
+  explicit Groups(std::uint32_t triangles) : lower_(triangles) {
+    std::iota(lower_.begin(), lower_.end(), 0U);
+  }
+
+  /// Joins those that meet, two alone, at an edge, unless `parted` tells one of them from the rest.
+  template <class Parted>
+  void join(const MeshEdges& edges, const Parted& parted) {
+    for (std::uint32_t e = 0; e < edges.size(); ++e) {
+      const auto halves = edges.halves(e);
+      if (halves.size() != 2 || parted(halves[0] / 3) || parted(halves[1] / 3)) continue;
+      const std::uint32_t a = of(halves[0] / 3);
+      const std::uint32_t b = of(halves[1] / 3);
+      lower_[std::max(a, b)] = std::min(a, b);
+    }
+  }
+
+  [[nodiscard]] std::uint32_t of(std::uint32_t triangle) {
+    while (lower_[triangle] != triangle) triangle = lower_[triangle] = lower_[lower_[triangle]];
+    return triangle;
+  }
+
+ private:
+  std::vector<std::uint32_t> lower_;
+};
+
 class Walls {
  public:
-  explicit Walls(const Mesh& mesh) : mesh_(mesh) {}
+  explicit Walls(const Mesh& mesh) : mesh_(mesh), edges_(mesh) {}
 
   SwallowedWalls find();
 
@@ -146,16 +174,20 @@ class Walls {
            std::vector<Polygon>& pieces) const;
 
   const Mesh& mesh_;
+  MeshEdges edges_;
+  std::vector<std::uint32_t> shell_;  ///< by triangle
   std::vector<Plane> planes_;
   std::vector<Box> boxes_;
 };
 
 /// False where a plane parts them: one of theirs, one along a side of each, or in one plane one
-/// through a side; touching is not meeting.
+/// through a side; touching is not meeting. Of triangles of one shell that share a vertex nothing
+/// else is expected.
 bool Walls::mayIntersect(std::uint32_t a, std::uint32_t b) const {
+  bool joined = false;
   for (const std::uint32_t v : mesh_.triangles[a])
-    for (const std::uint32_t w : mesh_.triangles[b])
-      if (v == w) return false;
+    for (const std::uint32_t w : mesh_.triangles[b]) joined |= v == w;
+  if (joined && shell_[a] == shell_[b]) return false;
   bool one_plane = true;
   for (const auto& [by, other] : {Pair(a, b), Pair(b, a)}) {
     if (planes_[by].normal == Vec3d(0, 0, 0)) return false;
@@ -274,34 +306,27 @@ SwallowedWalls Walls::find() {
   for (std::uint32_t t = 0; t < count; ++t) {
     planes_[t] = planeOf(t);
     for (std::size_t c = 0; c < 3; ++c) boxes_[t].expand(corner(t, c));
+    boxes_[t].expand(in_plane_mm);  // flat ones in one plane overlap
   }
+  Groups shells(count);
+  shells.join(edges_, [](std::uint32_t) { return false; });
+  shell_.resize(count);
+  for (std::uint32_t t = 0; t < count; ++t) shell_[t] = shells.of(t);
   const std::vector<Pair> pairs = intersections();
   std::vector<bool> crossed(count, false);
   for (const Pair& pair : pairs) crossed[pair.first] = true;
 
   // What hangs together without a crossing, each with its largest triangle.
-  const MeshEdges edges(mesh_);
   constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> patch(count);
-  std::iota(patch.begin(), patch.end(), 0U);
-  const auto root = [&](std::uint32_t t) {
-    while (patch[t] != t) t = patch[t] = patch[patch[t]];
-    return t;
-  };
-  for (std::uint32_t e = 0; e < edges.size(); ++e) {
-    const auto halves = edges.halves(e);
-    if (halves.size() != 2 || crossed[halves[0] / 3] || crossed[halves[1] / 3]) continue;
-    const std::uint32_t a = root(halves[0] / 3);
-    const std::uint32_t b = root(halves[1] / 3);
-    patch[std::max(a, b)] = std::min(a, b);
-  }
+  Groups patch(count);
+  patch.join(edges_, [&](std::uint32_t t) { return crossed[t]; });
   std::vector<std::uint32_t> largest(count, none);
   std::vector<double> area(count, 0);
   std::vector<std::uint32_t> patches;
   for (std::uint32_t t = 0; t < count; ++t) {
     if (crossed[t]) continue;
     const double own = (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).length();
-    const std::uint32_t of = root(t);
+    const std::uint32_t of = patch.of(t);
     if (of == t) patches.push_back(t);
     if (largest[of] == none || own > area[of]) {
       largest[of] = t;
@@ -343,7 +368,7 @@ SwallowedWalls Walls::find() {
 
   walls.hidden.assign(count, false);
   for (std::uint32_t t = 0; t < count; ++t) {
-    if (crossed[t] || surface[root(t)] != 0) continue;
+    if (crossed[t] || surface[patch.of(t)] != 0) continue;
     walls.hidden[t] = true;
     ++walls.swallowed;
   }

@@ -28,18 +28,29 @@ std::string text(const Coord& ijk) {
   return std::to_string(ijk.x()) + "," + std::to_string(ijk.y()) + "," + std::to_string(ijk.z());
 }
 
-int positiveModulo(int value, int modulus) {
-  if (std::has_single_bit(static_cast<unsigned>(modulus))) return value & (modulus - 1);
-  const int rest = value % modulus;
-  return rest < 0 ? rest + modulus : rest;
-}
-
 }  // namespace
 
+/// Places in `values_` along one axis of the tile.
+inline std::size_t ThresholdMask::Axis::operator()(int index) const {
+  if (low_bits != 0) return step * static_cast<std::size_t>(index & low_bits);
+  const int rest = index % period;
+  return step * static_cast<std::size_t>(rest < 0 ? rest + period : rest);
+}
+
 ThresholdMask::ThresholdMask(const Coord& size, std::vector<float> values)
-    : size_(size), values_(std::move(values)) {
-  assert(values_.size() == static_cast<std::size_t>(size.x()) * static_cast<std::size_t>(size.y()) *
-                               static_cast<std::size_t>(size.z()));
+    : values_(std::move(values)) {
+  repeat(size);
+}
+
+void ThresholdMask::repeat(const Coord& size) {
+  std::size_t step = 1;
+  for (const int axis : {2, 1, 0}) {
+    const int period = size[axis];
+    const bool masks = std::has_single_bit(static_cast<unsigned>(period));
+    axes_[static_cast<std::size_t>(axis)] = {period, masks ? period - 1 : 0, step};
+    step *= static_cast<std::size_t>(period);
+  }
+  assert(values_.size() == step);
 }
 
 ThresholdMask::ThresholdMask(const openvdb::FloatGrid& grid) {
@@ -50,7 +61,6 @@ ThresholdMask::ThresholdMask(const openvdb::FloatGrid& grid) {
                     std::to_string(grid.activeVoxelCount()) + " are active from " +
                     text(box.min()) + " to " + text(box.max()));
   }
-  size_ = box.dim();
   values_.resize(box.volume());
   openvdb::tools::Dense<float, openvdb::tools::LayoutZYX> dense(box, values_.data());
   openvdb::tools::copyToDense(grid, dense);
@@ -60,6 +70,7 @@ ThresholdMask::ThresholdMask(const openvdb::FloatGrid& grid) {
                       std::to_string(value));
     }
   }
+  repeat(box.dim());
 }
 
 ThresholdMask ThresholdMask::whiteNoise(std::uint64_t seed) {
@@ -75,10 +86,7 @@ float ThresholdMask::operator()(const Coord& ijk) const {
     // The odd multiples of 2⁻²⁴: every one is a float, and none is 0 or 1.
     return static_cast<float>(2 * (hash >> 41U) + 1) * 0x1p-24F;
   }
-  const int row =
-      positiveModulo(ijk.x(), size_.x()) * size_.y() + positiveModulo(ijk.y(), size_.y());
-  return values_[static_cast<std::size_t>(row) * static_cast<std::size_t>(size_.z()) +
-                 static_cast<std::size_t>(positiveModulo(ijk.z(), size_.z()))];
+  return values_[axes_[0](ijk.x()) + axes_[1](ijk.y()) + axes_[2](ijk.z())];
 }
 
 }  // namespace vdbdither

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -32,7 +33,15 @@ class ThresholdMask {
  private:
   ThresholdMask() = default;
 
-  openvdb::Coord size_;
+  struct Axis {
+    std::size_t operator()(int index) const;
+    int period = 1;
+    int low_bits = 0;  ///< of an index within a period that is a power of two; 0: of another
+    std::size_t step = 1;
+  };
+  void repeat(const openvdb::Coord& size);
+
+  std::array<Axis, 3> axes_;
   std::vector<float> values_;  ///< empty: white noise
   std::uint64_t seed_ = 0;
 };

@@ -126,6 +126,20 @@ class Manners(ProgramTest):
         for stage, whole in zip(half["stages"], told["stages"]):
             self.assertLess(stage["expected_cpu_seconds"], whole["expected_cpu_seconds"], stage["name"])
 
+    def test_who_works_at_the_surface_is_expected_to_take_no_longer_behind_a_wide_band(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
+        expected = {}
+        for band in (1, 8):
+            words = f"mesh2sdf part.stl --printer mimaki-3duj-553 --band {band} ! stats ! dither ! slice-export out --overwrite --json"
+            told = self.succeed("run", words)
+            for stage in json.loads(told.splitlines()[-1])["stages"]:
+                expected[stage["name"], band] = stage["expected_cpu_seconds"]
+        for name in ("stats", "dither"):
+            self.assertAlmostEqual(expected[name, 8] / expected[name, 1], 1, delta=0.1, msg=name)
+        # Its layers are more, each of which costs something.
+        self.assertLess(expected["slice-export", 8], 1.5 * expected["slice-export", 1])
+        self.assertGreater(expected["mesh2sdf", 8], 2 * expected["mesh2sdf", 1])
+
     def test_a_name_of_another_format_is_not_given_to_a_vdb(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
         self.refuse(2, "write: 'x.stl' is a mesh by its name, and this is a .vdb; mesh-export writes meshes",

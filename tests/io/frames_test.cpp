@@ -134,6 +134,48 @@ TEST_F(Frames, AFlippedByteIsFound) {
   }
 }
 
+/// The whole of `bytes` as one archive, or what it is refused with.
+std::string wholeOf(const std::string& bytes) {
+  const int file = ::memfd_create("frames", 0);
+  EXPECT_EQ(::write(file, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
+  ::lseek(file, 0, SEEK_SET);
+  std::string result;
+  try {
+    result = archiveBytes(FrameReader::readWhole(file, "the pipe"), VdbCodec::none);
+  } catch (const DataError& error) {
+    result = error.what();
+  }
+  ::close(file);
+  return result;
+}
+
+TEST_F(Frames, TheWholeOfThemIsWhatAFileHolds) {
+  const Schema schema = schemaOfSample();
+  const VdbContents file = contentsOf(schema, slabOf(schema, {-8, 24}).grids);
+  const std::string archive = archiveBytes(file, VdbCodec::none);
+  EXPECT_EQ(wholeOf(recorded()), archive);
+  EXPECT_EQ(wholeOf(archive), archive);
+  const int pipe = ::memfd_create("frames", 0);
+  FrameWriter writer(pipe);
+  writer.head(schema);
+  writer.end();
+  ::lseek(pipe, 0, SEEK_SET);
+  EXPECT_TRUE(FrameReader::readWhole(pipe, "the pipe").grids.at("surface")->empty());
+  ::close(pipe);
+}
+
+TEST_F(Frames, TheWholeIsRefusedWherePartOfItIsMissingOrMoreFollows) {
+  const std::string bytes = recorded();
+  const std::size_t end = bytes.rfind(" BDV");
+  EXPECT_EQ(wholeOf(bytes.substr(0, end)),
+            "the pipe ended before its closing frame: the run upstream failed or was stopped");
+  const Schema schema = schemaOfSample();
+  const std::string archive =
+      archiveBytes(contentsOf(schema, slabOf(schema, {-8, 24}).grids), VdbCodec::none);
+  EXPECT_EQ(wholeOf(archive + archive),
+            "the pipe goes on behind its archive; pipe in one file at a time");
+}
+
 TEST_F(Frames, AnArchiveOfAnotherToolIsOneSlab) {
   const Schema schema = schemaOfSample();
   EXPECT_EQ(outcome(archiveBytes({slabOf(schema, {0, 8}).grids, {}}, VdbCodec::none)), "1");

@@ -404,6 +404,37 @@ TEST(MeshDistance, NormalsOnTheSurfaceAreThoseOfTheMesh) {
   EXPECT_NEAR((normal(5, 0, 5) - Vec3d(0, -1, 0)).length(), 0, 1e-6);
 }
 
+TEST(MeshDistance, NormalsAreNotThoseOfTrianglesWithoutArea) {
+  // In the way of an edge along x, from its end to its middle and on, and first in the mesh.
+  Mesh mesh = boxMesh({0, 0, 0}, mimaki * Vec3d(10, 10, 10));
+  const auto at = [&](const Vec3d& p) {
+    return static_cast<std::uint32_t>(std::find(mesh.vertices.begin(), mesh.vertices.end(), p) -
+                                      mesh.vertices.begin());
+  };
+  const std::uint32_t from = at({0, 0, 0});
+  const std::uint32_t to = at({mimaki.x() * 10, 0, 0});
+  const auto middle = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.push_back({mimaki.x() * 5, 0, 0});
+  // One of the two faces at the edge is cut at the middle; the triangle closes what opens.
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    Mesh::Triangle& t = mesh.triangles[i];
+    const auto start = std::find(t.begin(), t.end(), from) - t.begin();
+    if (start == 3 || t[static_cast<std::size_t>(start + 1) % 3] != to) continue;
+    const std::uint32_t apex = t[static_cast<std::size_t>(start + 2) % 3];
+    t = {from, middle, apex};
+    mesh.triangles.push_back({middle, to, apex});
+    break;
+  }
+  mesh.triangles.insert(mesh.triangles.begin(), {from, to, middle});
+
+  const DistanceGrids grids =
+      distances(mesh, latticeAround(mesh, mimaki, {0, 0, 0}, 5), 0.12, {true, true});
+  for (auto it = grids.normals->cbeginValueOn(); it; ++it)
+    ASSERT_NEAR(it->length(), 1, 1e-6) << it.getCoord();
+  EXPECT_EQ(grids.surface->tree().getValue(Coord(5, 0, 0)), 0);
+  EXPECT_NE(grids.closest->tree().getValue(Coord(5, 0, 0)), 0);
+}
+
 TEST(MeshDistance, VoxelsOutsideTheBoxAreBackground) {
   const Mesh mesh = sphereMesh({0, 0, 0}, 0.6, 12);
   Lattice lattice = latticeAround(mesh, mimaki, {0, 0, 0}, 5);

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
+#include "ops/kernels/mesh_placement.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/errors.h"
 
@@ -27,14 +28,6 @@ Camera fromAbove(const Mesh& mesh, double pixel_mm, double distance_mm = 0) {
   camera.distance_mm = distance_mm;
   frame(camera, mesh, 2);
   return camera;
-}
-
-Mesh joined(Mesh a, const Mesh& b) {
-  const auto first = static_cast<std::uint32_t>(a.vertices.size());
-  a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
-  for (const Mesh::Triangle& t : b.triangles)
-    a.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  return a;
 }
 
 float lightAt(const RayPicture& picture, const Camera& camera, double x_mm, double y_mm) {
@@ -69,7 +62,7 @@ TEST(RayPicture, ASphereUnderTheSkyGetsWhatItSeesOfIt) {
 TEST(RayPicture, WhatLiesInAShadowGetsNoneOfTheLamp) {
   // A roof above the left half of a plate.
   const Mesh mesh =
-      joined(test::boxMesh({-4, -4, 0}, {4, 4, 1}), test::boxMesh({-4, -4, 3}, {-1, 4, 3.2}));
+      joined({test::boxMesh({-4, -4, 0}, {4, 4, 1}), test::boxMesh({-4, -4, 3}, {-1, 4, 3.2})});
   Camera camera = fromAbove(mesh, 0.1);
   camera.azimuth_degrees = 0;
   camera.elevation_degrees = 30;

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include <gtest/gtest.h>
 #include <openvdb/math/BBox.h>
 
 #include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/mesh_placement.h"
+#include "ops/kernels/mesh_repair.h"
 #include "tests/support/shapes.h"
 
 namespace vdbdither {
@@ -17,21 +20,11 @@ using openvdb::CoordBBox;
 using openvdb::Vec3d;
 using Box = openvdb::math::BBox<Vec3d>;
 
-Mesh together(const std::vector<Mesh>& parts) {
-  Mesh all;
-  for (const Mesh& part : parts) {
-    const auto first = static_cast<std::uint32_t>(all.vertices.size());
-    all.vertices.insert(all.vertices.end(), part.vertices.begin(), part.vertices.end());
-    for (const Mesh::Triangle& t : part.triangles)
-      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
-  return all;
-}
-
 Mesh meshOf(const std::vector<Box>& boxes) {
   std::vector<Mesh> parts;
+  parts.reserve(boxes.size());
   for (const Box& box : boxes) parts.push_back(test::boxMesh(box.min(), box.max()));
-  return together(parts);
+  return joined(std::move(parts));
 }
 
 double distanceTo(const Box& box, const Vec3d& p) {
@@ -46,7 +39,7 @@ double distanceToUnion(const std::vector<Box>& boxes, const Vec3d& p) {
   std::array<std::vector<double>, 3> cuts;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double>& own = cuts[static_cast<std::size_t>(axis)];
-    own = {-100, 100};
+    own = {-1e4, 1e4};
     for (const Box& box : boxes) own.insert(own.end(), {box.min()[axis], box.max()[axis]});
     std::sort(own.begin(), own.end());
     own.erase(std::unique(own.begin(), own.end()), own.end());
@@ -68,12 +61,15 @@ double distanceToUnion(const std::vector<Box>& boxes, const Vec3d& p) {
   return to_solid > 0 ? to_solid : -to_air;
 }
 
-/// Checks every voxel around the boxes: far inside, near swallowed walls and near the surface.
-void expectDistancesToTheUnion(const std::vector<Box>& boxes) {
-  const Vec3d pitch_mm(0.042, 0.084, 0.022);
-  const Lattice lattice{pitch_mm, Vec3d(0, 0, 0),
-                        CoordBBox(openvdb::Coord(-4, -3, -8), openvdb::Coord(34, 18, 64))};
-  const Mesh mesh = meshOf(boxes);
+const Vec3d pitch_mm(0.042, 0.084, 0.022);
+
+/// Checks every voxel around the boxes, of which `mesh` is made, when all lies `away` from the
+/// origin: far inside, near swallowed walls and near the surface.
+void expectDistancesToTheUnion(const std::vector<Box>& boxes, const Mesh& mesh,
+                               const openvdb::Coord& away) {
+  const Lattice lattice{
+      pitch_mm, Vec3d(0, 0, 0),
+      CoordBBox(openvdb::Coord(-4, -3, -8) + away, openvdb::Coord(34, 18, 64) + away)};
   const DistanceGrids grids =
       MeshDistance(mesh, lattice, Band{0, 0.3}, {}, swallowedWalls(mesh)).run(lattice.layers());
   int inside = 0;
@@ -84,6 +80,21 @@ void expectDistancesToTheUnion(const std::vector<Box>& boxes) {
     ASSERT_NEAR(grids.surface->tree().getValue(ijk), std::clamp(exact, -0.3, 0.3), 1e-6) << ijk;
   }
   EXPECT_GT(inside, 1000);
+}
+
+/// Near the origin and a metre away; whether the boxes have corners of their own or share those at
+/// one position, as they do once repaired.
+void expectDistancesToTheUnion(const std::vector<Box>& boxes) {
+  for (const openvdb::Coord& away : {openvdb::Coord(0), openvdb::Coord(2400, -9000, 34000)}) {
+    std::vector<Box> moved;
+    moved.reserve(boxes.size());
+    const Vec3d by_mm = away.asVec3d() * pitch_mm;
+    for (const Box& box : boxes) moved.emplace_back(box.min() + by_mm, box.max() + by_mm);
+    const Mesh mesh = meshOf(moved);
+    expectDistancesToTheUnion(moved, mesh, away);
+    MeshRepairs repairs;
+    expectDistancesToTheUnion(moved, repaired(mesh, repairs), away);
+  }
 }
 
 TEST(SwallowedWalls, ACleanMeshHasNone) {
@@ -117,11 +128,38 @@ TEST(SwallowedWalls, FacesInOnePlaneStaySurface) {
                              Box(Vec3d(0.4, 0.3, 0.03), Vec3d(1.2, 1.1, 0.71))});
 }
 
+TEST(SwallowedWalls, ShellsThatShareCornersHaveNoMembraneBetweenThem) {
+  expectDistancesToTheUnion({Box(Vec3d(0.02, 0.02, 0.5), Vec3d(0.3, 1.2, 0.9)),
+                             Box(Vec3d(0.02, 0.4, 0.1), Vec3d(0.3, 1.2, 0.5)),
+                             Box(Vec3d(0.02, 0.02, 0.5), Vec3d(1.2, 1.2, 0.7))});
+  // On the lattice, one upon the other.
+  expectDistancesToTheUnion({Box(Vec3d(0.042, 0.084, 0.022), Vec3d(0.84, 0.84, 0.44)),
+                             Box(Vec3d(0.042, 0.084, 0.44), Vec3d(0.42, 0.42, 0.88)),
+                             Box(Vec3d(0.042, 0.42, 0.44), Vec3d(0.84, 0.84, 0.66))});
+}
+
+TEST(SwallowedWalls, BoxesOnOneGridHaveNoMembraneBetweenThem) {
+  std::mt19937 random(4);
+  for (int n = 0; n < 12; ++n) {
+    std::vector<Box> boxes;
+    for (int box = 0; box < 3; ++box) {
+      Vec3d low;
+      Vec3d high;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto at = static_cast<double>(random() % 3);
+        low[axis] = 0.02 + 0.31 * at;
+        high[axis] = 0.02 + 0.31 * (at + 1 + static_cast<double>(random() % 2));
+      }
+      boxes.emplace_back(low, high);
+    }
+    expectDistancesToTheUnion(boxes);
+  }
+}
+
 TEST(SwallowedWalls, ACavityIsSurface) {
   Mesh cavity = test::boxMesh({0.3, 0.3, 0.3}, {0.7, 0.7, 0.7});
   for (Mesh::Triangle& t : cavity.triangles) std::swap(t[0], t[1]);
-  EXPECT_TRUE(
-      swallowedWalls(together({test::boxMesh({0, 0, 0}, {1, 1, 1}), cavity})).hidden.empty());
+  EXPECT_TRUE(swallowedWalls(joined({test::boxMesh({0, 0, 0}, {1, 1, 1}), cavity})).hidden.empty());
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/mesh_checks.h"
+
 namespace vdbdither {
 namespace {
 
@@ -27,20 +29,13 @@ Mesh facesOf(const BoolGrid& grid, const Lattice& lattice) {
   return mesh;
 }
 
-double volumeOf(const Mesh& mesh) {
-  double volume = 0;
-  for (const Mesh::Triangle& t : mesh.triangles)
-    volume += mesh.vertices[t[0]].dot(mesh.vertices[t[1]].cross(mesh.vertices[t[2]])) / 6;
-  return volume;
-}
-
 TEST(VoxelFaces, OneVoxelIsABlockAroundItsCentre) {
   const Lattice lattice{{0.1, 0.2, 0.4}, {0.01, 0, 0}, CoordBBox(Coord(0), Coord(6))};
   const auto grid = BoolGrid::create(false);
   grid->tree().setValueOn(Coord(2, 3, 4), true);
   const Mesh mesh = facesOf(*grid, lattice);
   EXPECT_EQ(mesh.triangles.size(), 12U);
-  EXPECT_NEAR(volumeOf(mesh), 0.1 * 0.2 * 0.4, 1e-12);
+  EXPECT_NEAR(test::volumeOf(mesh), 0.1 * 0.2 * 0.4, 1e-12);
   Vec3d low = mesh.vertices[0];
   for (const Vec3d& vertex : mesh.vertices) low = openvdb::math::minComponent(low, vertex);
   EXPECT_TRUE(low.eq(Vec3d(0.16, 0.5, 1.4), 1e-12)) << low;
@@ -77,7 +72,7 @@ TEST(VoxelFaces, ThereIsOneForEveryNeighbourThatIsNotOfTheSet) {
     ++found[{Coord::round(mesh.vertices[t[0]] + mesh.vertices[t[2]]), Coord::round(normal)}];
   }
   EXPECT_TRUE(found == expected);
-  EXPECT_NEAR(volumeOf(mesh), static_cast<double>(voxels), 1e-6);
+  EXPECT_NEAR(test::volumeOf(mesh), static_cast<double>(voxels), 1e-6);
 }
 
 }  // namespace

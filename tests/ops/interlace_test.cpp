@@ -105,6 +105,26 @@ TEST(Interlace, MakesTheSameOfSlabsOfAnyHeightWhateverLiesBeyondItsReach) {
   }
 }
 
+TEST(Interlace, TakesTilesOneByOneWhereTheirPairIsNotInside) {
+  const auto surface = FloatGrid::create(0.2F);
+  surface->setTransform(transformOf(refined()));
+  test::Voxels expected(plain.box, 0);
+  const auto putTile = [&](const Coord& origin) {
+    surface->tree().addTile(1, origin, -0.2F, false);
+    const Coord first(origin.x(), origin.y() / 2, origin.z());
+    for (const Coord& v : CoordBBox(first, first.offsetBy(7, 3, 7))) expected[v] = 1;
+  };
+  putTile({0, 0, 0});     // alone, the lower of its pair
+  putTile({8, 8, 0});     // the upper one
+  putTile({-8, -16, 0});  // a pair, and two others over it that are none
+  putTile({-8, -8, 0});
+  putTile({-8, -16, 8});
+  putTile({-8, 0, 8});
+  EXPECT_EQ(
+      solidOf(*test::filterCalled("interlace"), test::schemaOf(refined(), {{"surface", surface}})),
+      expected);
+}
+
 TEST(Interlace, LeavesTheRefinedLatticeWithTheSolidAlone) {
   Schema in = on(refined(), shapes[0]);
   in.grids["N"] = Vec3SGrid::create();
