@@ -350,6 +350,7 @@ class Octree {
   [[nodiscard]] double smoothCrossing(const Leaf& leaf, const Vec3d& from, const Vec3d& along,
                                       double low, double high) const;
   [[nodiscard]] Vec3d meet(const Leaf& leaf, std::span<const Crossing> crossings) const;
+  [[nodiscard]] Vec3d within(const Leaf& leaf, Vec3d p) const;
   [[nodiscard]] Vec3d vertexOf(const Leaf& leaf, std::span<const Crossing> crossings) const;
 
   const Mesh& mesh_;
@@ -655,12 +656,17 @@ Vec3d Octree::meet(const Leaf& leaf, std::span<const Crossing> crossings) const 
     if (strengths[i] > 0.05 * static_cast<double>(crossings.size()))
       at += direction * (direction.dot(pull) / strengths[i]);
   }
+  return within(leaf, at);
+}
+
+/// The point of the leaf nearest to p, or nearly.
+Vec3d Octree::within(const Leaf& leaf, Vec3d p) const {
   const Vec3d low = position(leaf.low);
   const double size_mm = leaf.size * unit_mm_;
   constexpr double least = 1.0 / 1024;
   for (int axis = 0; axis < 3; ++axis)
-    at[axis] = std::clamp(at[axis], low[axis] + least * size_mm, low[axis] + (1 - least) * size_mm);
-  return at;
+    p[axis] = std::clamp(p[axis], low[axis] + least * size_mm, low[axis] + (1 - least) * size_mm);
+  return p;
 }
 
 /// Where the tangents meet, or near that where the number is ½.
@@ -671,7 +677,7 @@ Vec3d Octree::vertexOf(const Leaf& leaf, std::span<const Crossing> crossings) co
   if (!is_smooth || leaf.count > 0) return at;
   const Vec3d slope = side_ * cells_.gradientAt(leaf.cell, at);
   const Vec3d step = slope * ((0.5 - numberAt(leaf, at)) / slope.dot(slope));
-  return step.length() < 0.25 * leaf.size * unit_mm_ ? at + step : at;
+  return step.length() < 0.25 * leaf.size * unit_mm_ ? within(leaf, at + step) : at;
 }
 
 /// What an edge of the leaf passes.

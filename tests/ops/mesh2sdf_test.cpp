@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -202,7 +203,12 @@ TEST_F(Mesh2Sdf, GuessesOnlyThoseOfSeveralFilesThatAreLoose) {
   const std::string beside = (folder_ / "beside.obj").string();
   writeObj(beside, test::transformed(looseBox(), {0, 0, 0}, {2, 0, 0}));
   const Schema schema = plan({beside, "--pitch", "0.1,0.1,0.05"});
-  EXPECT_EQ(listener_.warnings.size(), 1U);
+  // Where a guess passes through itself more may be told.
+  EXPECT_EQ(std::count_if(listener_.warnings.begin(), listener_.warnings.end(),
+                          [](const std::string& warning) {
+                            return warning.find("the part is guessed") != std::string::npos;
+                          }),
+            1);
   const Grids grids = source().run(schema.lattice.layers());
   const auto part = openvdb::gridConstPtrCast<openvdb::Int32Grid>(grids.at("part"));
   const auto surface = openvdb::gridConstPtrCast<openvdb::FloatGrid>(grids.at("surface"));
