@@ -173,10 +173,10 @@ TEST(HoleFilling, AFlatHoleKeepsItsFan) {
 }
 
 TEST(HoleFilling, HolesTooSmallToMatterKeepTheirFans) {
-  const auto lacksAQuad = [](const Vec3d& p) {
+  const auto lacks_a_quad = [](const Vec3d& p) {
     return std::abs(p.x() - 4.8) < 0.2 && std::abs(p.z() - 1) < 0.4 && std::abs(p.y() - 0.4) < 0.4;
   };
-  const Mesh open = without(test::sphereMesh({0, 0, 0}, 5, 32), lacksAQuad);
+  const Mesh open = without(test::sphereMesh({0, 0, 0}, 5, 32), lacks_a_quad);
   ASSERT_EQ(loopsOf(open).size(), 1U);
   ASSERT_GT(loopsOf(open).front().size(), 3U);
   EXPECT_EQ(filled(open).triangles, fanned(open).triangles);
