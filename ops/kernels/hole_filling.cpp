@@ -174,7 +174,8 @@ Membranes::Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops
 /// it, begins again; inwards where it is below, until it is not.
 Membranes::Way Membranes::way(const Place& place) const {
   constexpr int steps = 8;
-  constexpr int halvings = 8;
+  constexpr int narrowings = 8;
+  constexpr double near_half = 2e-4;
   const double here = number_.closelyAt(place.at) - 0.5;
   const bool is_inside = here > 0;
   // Where ½ is near the number itself tells the way to it. Between parts that cover one another's
@@ -203,8 +204,13 @@ Membranes::Way Membranes::way(const Place& place) const {
     high = look(static_cast<double>(step) / steps);
   }
   if (!high.arrived) return {along, false};
-  for (int halving = 0; halving < halvings; ++halving) {
-    const Seen middle = look(0.5 * (low.t + high.t));
+  for (int narrowing = 0; narrowing < narrowings; ++narrowing) {
+    // Where ½ is passed without a triangle the number hardly bends.
+    const bool is_passed = (high.number > 0.5) != is_inside;
+    const double share =
+        is_passed ? std::clamp((0.5 - low.number) / (high.number - low.number), 0.1, 0.9) : 0.5;
+    const Seen middle = look(low.t + share * (high.t - low.t));
+    if (is_passed && std::abs(middle.number - 0.5) < near_half) return {along * middle.t, true};
     (middle.arrived ? high : low) = middle;
   }
   const bool is_triangle =
