@@ -24,11 +24,11 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
+#include "ops/kernels/grid_keys.h"
 #include "ops/kernels/marching_cubes.h"
 #include "ops/kernels/surface_error.h"
 #include "ops/kernels/triangle_and_cube.h"
-#include "ops/kernels/winding_cell.h"
-#include "ops/kernels/winding_number.h"
+#include "ops/kernels/winding_cells.h"
 #include "vdbdither/openvdb.h"
 
 namespace vdbdither {
@@ -38,110 +38,16 @@ using openvdb::Vec3d;
 
 namespace {
 
-using Bounds = openvdb::math::BBox<Vec3d>;
-/// A place in units, in the order of z, y, x; with what an edge or a leaf has besides.
-using Key = std::uint64_t;
-
-constexpr int key_bits = 19;
-constexpr int key_offset = 1 << (key_bits - 1);
 constexpr std::uint32_t none = ~std::uint32_t{0};
 
-/// Undivided cells along the longest side.
-constexpr double coarse_cells = 64;
 /// How often a cell is cut in eight; the smallest have an edge of one unit.
 constexpr int most_cuts = 5;
-constexpr int coarse_units = 1 << most_cuts;
+constexpr int coarse_units = WindingCells::units;
+static_assert(coarse_units == 1 << most_cuts);
 /// What a vertex may miss the tangents at the crossings of its cell by, of the longest side.
 constexpr double tolerance = 1e-4;
 /// Between two passes that are no wall, of the longest side.
 constexpr double least_wall = 4e-4;
-
-Key keyOf(const Coord& ijk) {
-  const auto part = [](int index) { return static_cast<Key>(index + key_offset); };
-  return part(ijk.z()) << 2 * key_bits | part(ijk.y()) << key_bits | part(ijk.x());
-}
-Coord coordOf(Key key) {
-  const auto part = [](Key bits) {
-    return static_cast<int>(bits & ((1U << key_bits) - 1)) - key_offset;
-  };
-  return {part(key), part(key >> key_bits), part(key >> 2 * key_bits)};
-}
-
-/// Values by key, never walked through: open addressing, for millions of them.
-template <class T>
-class Map {
- public:
-  [[nodiscard]] const T* find(Key key) const {
-    if (slots_.empty()) return nullptr;
-    const Slot& slot = slots_[placeOf(key)];
-    return slot.key == key ? &slot.value : nullptr;
-  }
-  [[nodiscard]] bool contains(Key key) const { return find(key) != nullptr; }
-  [[nodiscard]] const T& at(Key key) const { return *find(key); }
-  /// Returns the value, and whether it is this one that is new.
-  std::pair<T&, bool> add(Key key, const T& value) {
-    if (2 * count_ >= slots_.size()) grow();
-    Slot& slot = slots_[placeOf(key)];
-    const bool is_new = slot.key != key;
-    if (is_new) {
-      slot = {key, value};
-      ++count_;
-    }
-    return {slot.value, is_new};
-  }
-
- private:
-  static constexpr Key empty = ~Key{0};
-  struct Slot {
-    Key key = empty;
-    T value{};
-  };
-
-  /// Where the key is, or belongs.
-  [[nodiscard]] std::size_t placeOf(Key key) const {
-    Key scattered = key * 0x9e3779b97f4a7c15ULL;
-    scattered ^= scattered >> 32;
-    std::size_t place = scattered & (slots_.size() - 1);
-    while (slots_[place].key != key && slots_[place].key != empty)
-      place = (place + 1) & (slots_.size() - 1);
-    return place;
-  }
-  void grow() {
-    std::vector<Slot> old(std::max<std::size_t>(1024, 2 * slots_.size()));
-    old.swap(slots_);
-    for (const Slot& slot : old)
-      if (slot.key != empty) slots_[placeOf(slot.key)] = slot;
-  }
-
-  std::vector<Slot> slots_;
-  std::size_t count_ = 0;
-};
-
-/// Erases what `is_done` says, which is asked on all threads.
-template <class T, class IsDone>
-void eraseAll(std::vector<T>& values, const IsDone& is_done) {
-  std::vector<char> done(values.size());
-  tbb::parallel_for(std::size_t{0}, values.size(),
-                    [&](std::size_t i) { done[i] = is_done(values[i]) ? 1 : 0; });
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (done[i] == 0) values[kept++] = values[i];
-  values.resize(kept);
-}
-
-template <class T>
-void sortUnique(std::vector<T>& values) {
-  tbb::parallel_sort(values.begin(), values.end());
-  values.erase(std::unique(values.begin(), values.end()), values.end());
-}
-
-/// The first of those with the same key.
-template <class T>
-void sortUniqueKeys(std::vector<std::pair<Key, T>>& values) {
-  tbb::parallel_sort(values.begin(), values.end());
-  const auto same = [](const auto& a, const auto& b) { return a.first == b.first; };
-  values.erase(std::unique(values.begin(), values.end(), same), values.end());
-}
 
 /// Tells of a stretch of the whole.
 class Stretch {
@@ -172,95 +78,11 @@ void forAll(std::size_t count, const Stretch& stretch, const Work& work) {
   }
 }
 
-/// The number of a mesh, in a grid of undivided cells.
-class Cells {
- public:
-  Cells(const Mesh& mesh, const Bounds& bounds)
-      : mesh_(mesh),
-        winding_(mesh),
-        longest_mm_(bounds.extents()[static_cast<int>(bounds.maxExtent())]),
-        unit_mm_(longest_mm_ / coarse_cells / coarse_units),
-        // A part of a cell that keeps corners out of planes which designers like.
-        origin_mm_(bounds.min() - coarse_units * unit_mm_ * Vec3d(0.3819, 0.4142, 0.3028)),
-        limits_(Coord::floor((bounds.min() - 0.5 * longest_mm_ - origin_mm_) / unit_mm_),
-                Coord::ceil((bounds.max() + 0.5 * longest_mm_ - origin_mm_) / unit_mm_)) {}
-
-  /// The cells from corners, which are made where there are none.
-  std::vector<std::uint32_t> at(const std::vector<Coord>& lows);
-
-  [[nodiscard]] double numberAt(std::uint32_t cell, const Vec3d& p) const {
-    return cells_[cell].at(mesh_, p);
-  }
-  /// The same, but on the side of ½ and −½ on which it is.
-  [[nodiscard]] double judgedAt(std::uint32_t cell, const Vec3d& p) const {
-    constexpr double doubt = 1e-3;
-    const double number = numberAt(cell, p);
-    return std::abs(std::abs(number) - 0.5) < doubt ? winding_.judgedAt(p) : number;
-  }
-  [[nodiscard]] Vec3d gradientAt(std::uint32_t cell, const Vec3d& p) const {
-    return cells_[cell].gradientAt(mesh_, p);
-  }
-  [[nodiscard]] const Mesh& mesh() const { return mesh_; }
-  [[nodiscard]] double longestMm() const { return longest_mm_; }
-  [[nodiscard]] double unitMm() const { return unit_mm_; }
-  [[nodiscard]] Vec3d position(const Coord& corner) const {
-    return origin_mm_ + corner.asVec3d() * unit_mm_;
-  }
-  /// Of corners that may be inside.
-  [[nodiscard]] const openvdb::CoordBBox& limits() const { return limits_; }
-
- private:
-  const Mesh& mesh_;
-  WindingNumber winding_;
-  double longest_mm_, unit_mm_;
-  Vec3d origin_mm_;
-  openvdb::CoordBBox limits_;
-  Map<WindingCell::Corner> corners_;
-  Map<std::uint32_t> cell_at_;
-  std::vector<WindingCell> cells_;
-};
-
-std::vector<std::uint32_t> Cells::at(const std::vector<Coord>& lows) {
-  const auto cornerOf = [](const Coord& low, unsigned corner) {
-    return low.offsetBy((corner & 1) != 0 ? coarse_units : 0, (corner & 2) != 0 ? coarse_units : 0,
-                        (corner & 4) != 0 ? coarse_units : 0);
-  };
-  std::vector<std::uint32_t> found;
-  std::vector<Coord> fresh;
-  std::vector<Key> asked;
-  for (const Coord& low : lows) {
-    const auto [cell, is_new] =
-        cell_at_.add(keyOf(low), static_cast<std::uint32_t>(cells_.size() + fresh.size()));
-    found.push_back(cell);
-    if (!is_new) continue;
-    fresh.push_back(low);
-    for (unsigned corner = 0; corner < 8; ++corner) asked.push_back(keyOf(cornerOf(low, corner)));
-  }
-  sortUnique(asked);
-  eraseAll(asked, [this](Key key) { return corners_.contains(key); });
-  std::vector<WindingCell::Corner> made(asked.size());
-  tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t i) {
-    const Vec3d p = position(coordOf(asked[i]));
-    made[i] = {winding_.closelyAt(p), winding_.gradientAt(p)};
-  });
-  for (std::size_t i = 0; i < asked.size(); ++i) corners_.add(asked[i], made[i]);
-  const std::size_t before = cells_.size();
-  cells_.resize(before + fresh.size());
-  tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
-    std::array<WindingCell::Corner, 8> corners;
-    for (unsigned corner = 0; corner < 8; ++corner)
-      corners[corner] = corners_.at(keyOf(cornerOf(fresh[i], corner)));
-    cells_[before + i] =
-        WindingCell(mesh_, winding_, position(fresh[i]), coarse_units * unit_mm_, corners);
-  });
-  return found;
-}
-
 /// The set and its surface.
 class Octree {
  public:
   /// Of the places where the number exceeds ½, or if `side` is −1 where it is below −½.
-  Octree(Cells& cells, double side, int most_cuts_here, std::size_t most_leaves)
+  Octree(WindingCells& cells, double side, int most_cuts_here, std::size_t most_leaves)
       : mesh_(cells.mesh()),
         cells_(cells),
         side_(side),
@@ -354,18 +176,18 @@ class Octree {
   [[nodiscard]] Vec3d vertexOf(const Leaf& leaf, std::span<const Crossing> crossings) const;
 
   const Mesh& mesh_;
-  Cells& cells_;
+  WindingCells& cells_;
   double side_;
   double unit_mm_;
   int smallest_;  ///< that leaves may become
   std::size_t most_leaves_;
   double tolerance_mm_;
   std::vector<Leaf> leaves_;
-  Map<std::uint32_t> leaf_at_;
+  KeyMap<std::uint32_t> leaf_at_;
   std::vector<std::uint32_t> touches_;
-  Map<bool> inside_;  ///< by corner
+  KeyMap<bool> inside_;  ///< by corner
   std::vector<Crossing> crossings_;
-  Map<std::uint32_t> crossing_at_;  ///< by edge, of those that are cut or pierced
+  KeyMap<std::uint32_t> crossing_at_;  ///< by edge, of those that are cut or pierced
   int least_ = coarse_units;
 };
 
@@ -827,13 +649,13 @@ Mesh Octree::surface() const {
 WindingSurface windingSurface(const Mesh& triangles, const std::function<void(double)>& progress,
                               std::size_t most_leaves) {
   WindingSurface made;
-  Bounds bounds;
+  openvdb::math::BBox<Vec3d> bounds;
   for (const Mesh::Triangle& t : triangles.triangles)
     for (const std::uint32_t v : t) bounds.expand(triangles.vertices[v]);
   if (bounds.empty() || !(bounds.extents().length() > 0)) return made;
 
   const Stretch stretch(progress);
-  Cells cells(triangles, bounds);
+  WindingCells cells(triangles, bounds);
   const auto volume = [&](double side, const Stretch& told) {
     Octree coarse(cells, side, 0, 0);
     coarse.grow(told);

@@ -1,0 +1,58 @@
+#include "ops/kernels/winding_cells.h"
+
+#include <array>
+
+#include <tbb/parallel_for.h>
+
+namespace vdbdither {
+
+using openvdb::Coord;
+using openvdb::Vec3d;
+
+WindingCells::WindingCells(const Mesh& mesh, const openvdb::math::BBox<Vec3d>& bounds)
+    : mesh_(mesh),
+      winding_(mesh),
+      longest_mm_(bounds.extents()[static_cast<int>(bounds.maxExtent())]),
+      unit_mm_(longest_mm_ / along_longest / units),
+      // A part of a cell that keeps corners out of planes which designers like.
+      origin_mm_(bounds.min() - units * unit_mm_ * Vec3d(0.3819, 0.4142, 0.3028)),
+      limits_(Coord::floor((bounds.min() - 0.5 * longest_mm_ - origin_mm_) / unit_mm_),
+              Coord::ceil((bounds.max() + 0.5 * longest_mm_ - origin_mm_) / unit_mm_)) {}
+
+std::vector<std::uint32_t> WindingCells::at(const std::vector<Coord>& lows) {
+  const auto cornerOf = [](const Coord& low, unsigned corner) {
+    return low.offsetBy((corner & 1) != 0 ? units : 0, (corner & 2) != 0 ? units : 0,
+                        (corner & 4) != 0 ? units : 0);
+  };
+  std::vector<std::uint32_t> found;
+  std::vector<Coord> fresh;
+  std::vector<Key> asked;
+  for (const Coord& low : lows) {
+    const auto [cell, is_new] =
+        cell_at_.add(keyOf(low), static_cast<std::uint32_t>(cells_.size() + fresh.size()));
+    found.push_back(cell);
+    if (!is_new) continue;
+    fresh.push_back(low);
+    for (unsigned corner = 0; corner < 8; ++corner) asked.push_back(keyOf(cornerOf(low, corner)));
+  }
+  sortUnique(asked);
+  eraseAll(asked, [this](Key key) { return corners_.contains(key); });
+  std::vector<WindingCell::Corner> made(asked.size());
+  tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t i) {
+    const Vec3d p = position(coordOf(asked[i]));
+    made[i] = {winding_.closelyAt(p), winding_.gradientAt(p)};
+  });
+  for (std::size_t i = 0; i < asked.size(); ++i) corners_.add(asked[i], made[i]);
+  const std::size_t before = cells_.size();
+  cells_.resize(before + fresh.size());
+  tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
+    std::array<WindingCell::Corner, 8> corners;
+    for (unsigned corner = 0; corner < 8; ++corner)
+      corners[corner] = corners_.at(keyOf(cornerOf(fresh[i], corner)));
+    cells_[before + i] =
+        WindingCell(mesh_, winding_, position(fresh[i]), units * unit_mm_, corners);
+  });
+  return found;
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <openvdb/Types.h>
+#include <openvdb/math/BBox.h>
+
+#include "ops/kernels/grid_keys.h"
+#include "ops/kernels/winding_cell.h"
+#include "ops/kernels/winding_number.h"
+#include "vdbdither/mesh.h"
+
+namespace vdbdither {
+
+/// The generalized winding number of a mesh in a grid of cells, 64 along the longest side of its
+/// bounding box. Places on the grid are in units, so many of which make the edge of a cell.
+class WindingCells {
+ public:
+  static constexpr double along_longest = 64;
+  static constexpr int units = 32;
+
+  /// The mesh must outlive the cells; `bounds` is its bounding box.
+  WindingCells(const Mesh& mesh, const openvdb::math::BBox<openvdb::Vec3d>& bounds);
+
+  /// The cells whose lowest corners these are; those that are not there yet are made.
+  std::vector<std::uint32_t> at(const std::vector<openvdb::Coord>& lows);
+
+  /// The number at a place in a cell.
+  [[nodiscard]] double numberAt(std::uint32_t cell, const openvdb::Vec3d& p) const {
+    return cells_[cell].at(mesh_, p);
+  }
+  /// The same, but on the side of ½ and −½ on which it is.
+  [[nodiscard]] double judgedAt(std::uint32_t cell, const openvdb::Vec3d& p) const {
+    constexpr double doubt = 1e-3;
+    const double number = numberAt(cell, p);
+    return std::abs(std::abs(number) - 0.5) < doubt ? winding_.judgedAt(p) : number;
+  }
+  /// How it rises there, per mm; nearly.
+  [[nodiscard]] openvdb::Vec3d gradientAt(std::uint32_t cell, const openvdb::Vec3d& p) const {
+    return cells_[cell].gradientAt(mesh_, p);
+  }
+  [[nodiscard]] const Mesh& mesh() const { return mesh_; }
+  [[nodiscard]] double longestMm() const { return longest_mm_; }
+  [[nodiscard]] double unitMm() const { return unit_mm_; }
+  /// Of a place on the grid, mm.
+  [[nodiscard]] openvdb::Vec3d position(const openvdb::Coord& corner) const {
+    return origin_mm_ + corner.asVec3d() * unit_mm_;
+  }
+  /// Places farther out count as outside.
+  [[nodiscard]] const openvdb::CoordBBox& limits() const { return limits_; }
+
+ private:
+  const Mesh& mesh_;
+  WindingNumber winding_;
+  double longest_mm_, unit_mm_;
+  openvdb::Vec3d origin_mm_;
+  openvdb::CoordBBox limits_;
+  KeyMap<WindingCell::Corner> corners_;
+  KeyMap<std::uint32_t> cell_at_;
+  std::vector<WindingCell> cells_;
+};
+
+}  // namespace vdbdither
