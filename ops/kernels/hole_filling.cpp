@@ -161,12 +161,13 @@ Membranes::Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops
   };
   fill(fillWithLeastArea);
   first_ = mesh_;
+  std::vector<std::uint32_t> first_hole = hole_;
   first_number_.emplace(first_);
   miss_mm_ = miss_mm3 / vdbdither::areaOf(mesh_);
   fill(fillWithFan);
   of_fans_mm3_ = misses();
   mesh_ = first_;
-  fill(fillWithLeastArea);
+  hole_ = std::move(first_hole);
   is_new_.assign(mesh_.vertices.size(), true);
 }
 
@@ -343,6 +344,7 @@ void fillWithFans(Mesh& mesh, std::span<const HoleLoop> loops) {
 }
 
 void fillWhereNumberIsHalf(Mesh& mesh, std::span<const HoleLoop> loops) {
+  if (loops.empty()) return;
   Mesh fanned = mesh;
   fillWithFans(fanned, loops);
   const double miss_mm3 = volume_tolerance * std::abs(volumeOf(fanned));

@@ -66,17 +66,18 @@ PlainTiles plainTiles(const FloatTree& refined, ZRange core) {
       plain.whole.push_back(box);
       continue;
     }
-    int top = box.min().z() - 1;  // of the last box
+    bool goes_on = false;
     for (Coord leaf = first; leaf.z() <= box.max().z(); leaf.z() += leaf_layers) {
       if (!isInsideTile(leaf.offsetBy(0, is_lower ? leaf_layers : -leaf_layers, 0))) {
         plain.leaves.push_back(plainOrigin(leaf));
+        goes_on = false;
       } else if (is_lower) {
-        if (leaf.z() != top + 1 || leaf.z() <= box.min().z()) {
+        if (!goes_on) {
           plain.whole.push_back(box);
           plain.whole.back().min().z() = std::max(box.min().z(), leaf.z());
         }
-        top = std::min(box.max().z(), leaf.z() + leaf_layers - 1);
-        plain.whole.back().max().z() = top;
+        plain.whole.back().max().z() = std::min(box.max().z(), leaf.z() + leaf_layers - 1);
+        goes_on = true;
       }
     }
   }

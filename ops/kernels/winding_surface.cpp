@@ -244,10 +244,10 @@ void Octree::addTouched() {
       const Vec3d last = (high - origin_mm) / cell_mm + rounding;
       const double rise =
           0.5 * (std::abs(normal[u]) + std::abs(normal[v])) / std::abs(normal[w]) + rounding;
+      const Vec3d from = (at[0] - origin_mm) / cell_mm;
       Coord cell;
       for (cell[u] = static_cast<int>(std::floor(first[u])); cell[u] <= last[u]; ++cell[u])
         for (cell[v] = static_cast<int>(std::floor(first[v])); cell[v] <= last[v]; ++cell[v]) {
-          const Vec3d from = (at[0] - origin_mm) / cell_mm;
           const double height = from[w] - (normal[u] * (cell[u] + 0.5 - from[u]) +
                                            normal[v] * (cell[v] + 0.5 - from[v])) /
                                               normal[w];

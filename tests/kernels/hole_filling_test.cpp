@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "ops/kernels/mesh_placement.h"
 #include "ops/kernels/winding_number.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/shapes.h"
@@ -37,14 +38,6 @@ std::vector<HoleLoop> loopsOf(const Mesh& mesh) {
     loop.pop_back();
   }
   return loops;
-}
-
-Mesh append(Mesh mesh, const Mesh& more) {
-  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-  mesh.vertices.insert(mesh.vertices.end(), more.vertices.begin(), more.vertices.end());
-  for (const Mesh::Triangle& t : more.triangles)
-    mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  return mesh;
 }
 
 /// `mesh` without the triangles about whose middle `lacks` is true.
@@ -85,8 +78,8 @@ Mesh cutBar() {
   const auto lacksTop = [](double z) {
     return [z](const Vec3d& p) { return std::abs(p.z() - z) < 1e-9; };
   };
-  return append(without(test::boxMesh({0, 0, 0}, {8, 8, 10}), lacksTop(10)),
-                without(test::boxMesh({0, 0, 10.5}, {8, 8, 20}), lacksTop(10.5)));
+  return joined({without(test::boxMesh({0, 0, 0}, {8, 8, 10}), lacksTop(10)),
+                 without(test::boxMesh({0, 0, 10.5}, {8, 8, 20}), lacksTop(10.5))});
 }
 
 Mesh filled(Mesh mesh) {
@@ -123,23 +116,10 @@ double share(const Mesh& open, const Mesh& closed) {
   return static_cast<double>(wrong) / inside;
 }
 
-/// Whether every side is met by an opposite one.
-bool isCycle(const Mesh& mesh) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> surplus;
-  for (const Mesh::Triangle& t : mesh.triangles)
-    for (std::size_t side = 0; side < 3; ++side) {
-      const std::uint32_t a = t[side];
-      const std::uint32_t b = t[(side + 1) % 3];
-      surplus[std::minmax(a, b)] += a < b ? 1 : -1;
-    }
-  return std::all_of(surplus.begin(), surplus.end(),
-                     [](const auto& side) { return side.second == 0; });
-}
-
 TEST(HoleFilling, LiesWhereTheNumberIsAHalf) {
   for (const Mesh& open : {saddleTopped(), withCrescent()}) {
     const Mesh made = filled(open);
-    EXPECT_TRUE(isCycle(made));
+    EXPECT_EQ(test::openSides(made), 0U);
     EXPECT_GT(share(open, fanned(open)), 0.005);
     EXPECT_LT(share(open, made), 1e-3);
     EXPECT_LT(made.triangles.size(), open.triangles.size() + 5000);
@@ -152,7 +132,7 @@ TEST(HoleFilling, LiesWhereTheNumberIsAHalf) {
 TEST(HoleFilling, JoinsHalvesThatFaceEachOther) {
   const Mesh open = cutBar();
   const Mesh made = filled(open);
-  EXPECT_TRUE(isCycle(made));
+  EXPECT_EQ(test::openSides(made), 0U);
   EXPECT_GT(share(open, fanned(open)), 0.02);
   EXPECT_LT(share(open, made), 1e-3);
 }
@@ -175,7 +155,7 @@ TEST(HoleFilling, AFlatHoleKeepsItsFan) {
 TEST(HoleFilling, HolesTooSmallToMatterKeepTheirFans) {
   const Mesh alone = saddleTopped();
   EXPECT_NE(filled(alone).triangles, fanned(alone).triangles);
-  const Mesh beside = append(alone, test::boxMesh({20, 0, 0}, {220, 200, 100}));
+  const Mesh beside = joined({alone, test::boxMesh({20, 0, 0}, {220, 200, 100})});
   EXPECT_EQ(filled(beside).triangles, fanned(beside).triangles);
 }
 
@@ -183,7 +163,7 @@ TEST(HoleFilling, WithinTheSolidKeepsItsFan) {
   // A bar that is open within a ball.
   const Mesh bar =
       without(test::boxMesh({-1, -1, 0}, {1, 1, 12}), [](const Vec3d& p) { return p.z() == 0; });
-  const Mesh open = append(test::sphereMesh({0, 0, 0}, 5, 16), bar);
+  const Mesh open = joined({test::sphereMesh({0, 0, 0}, 5, 16), bar});
   EXPECT_EQ(filled(open).triangles, fanned(open).triangles);
 }
 

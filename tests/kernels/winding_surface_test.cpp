@@ -1,7 +1,6 @@
 #include "ops/kernels/winding_surface.h"
 
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <random>
 
@@ -52,20 +51,6 @@ Mesh randomTriangles(unsigned seed, int count) {
   return mesh;
 }
 
-/// How many sides are not met by as many in the opposite direction.
-std::size_t openSides(const Mesh& mesh) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> surplus;
-  for (const Mesh::Triangle& t : mesh.triangles)
-    for (std::size_t side = 0; side < 3; ++side) {
-      const std::uint32_t a = t[side];
-      const std::uint32_t b = t[(side + 1) % 3];
-      surplus[std::minmax(a, b)] += a < b ? 1 : -1;
-    }
-  std::size_t open = 0;
-  for (const auto& [side, count] : surplus) open += count != 0;
-  return open;
-}
-
 /// Of so many random points about the mesh, those that are on another side of the made surface than
 /// the exact number says, as a share of those inside.
 double shareOfWrongSides(const Mesh& loose, const Mesh& made, int points, double side = 1) {
@@ -93,7 +78,7 @@ TEST(WindingSurface, ACubePulledApartComesBack) {
   const Mesh cube = test::boxMesh({1, 2, 3}, {11, 12, 13});
   const WindingSurface surface = windingSurface(pulledApart(cube, 0.05), {}, few_leaves);
   EXPECT_FALSE(surface.turned);
-  EXPECT_EQ(openSides(surface.mesh), 0U);
+  EXPECT_EQ(test::openSides(surface.mesh), 0U);
   EXPECT_NEAR(test::volumeOf(surface.mesh), 1000, 1);
   for (const Vec3d& v : surface.mesh.vertices) {
     const Vec3d from = v - Vec3d(6, 7, 8);
@@ -105,7 +90,7 @@ TEST(WindingSurface, ACubePulledApartComesBack) {
 TEST(WindingSurface, ASpherePulledApartComesBack) {
   const Mesh sphere = test::sphereMesh({0, 0, 0}, 5, 12);
   const WindingSurface surface = windingSurface(pulledApart(sphere, 0.02), {}, few_leaves);
-  EXPECT_EQ(openSides(surface.mesh), 0U);
+  EXPECT_EQ(test::openSides(surface.mesh), 0U);
   EXPECT_NEAR(test::volumeOf(surface.mesh) / test::volumeOf(sphere), 1, 0.002);
   for (const Vec3d& v : surface.mesh.vertices) ASSERT_NEAR(v.length(), 4.93, 0.1) << v;
 }
@@ -113,7 +98,7 @@ TEST(WindingSurface, ASpherePulledApartComesBack) {
 TEST(WindingSurface, OfAClosedMeshIsTheMesh) {
   const Mesh box = test::boxMesh({0, 0, 0}, {4, 7, 3});
   const WindingSurface surface = windingSurface(box, {}, few_leaves);
-  EXPECT_EQ(openSides(surface.mesh), 0U);
+  EXPECT_EQ(test::openSides(surface.mesh), 0U);
   EXPECT_NEAR(test::volumeOf(surface.mesh), 84, 1e-3);
 }
 
@@ -121,7 +106,7 @@ TEST(WindingSurface, KeepsWallsThinnerThanACoarseCell) {
   // 100 mm long, 0.4 mm thick, in no plane of the cells.
   const Mesh wall = test::transformed(test::boxMesh({0, 0, 0}, {100, 40, 0.4}), {20, 30, 10}, {});
   const WindingSurface surface = windingSurface(pulledApart(wall, 0.01), {}, 400'000);
-  EXPECT_EQ(openSides(surface.mesh), 0U);
+  EXPECT_EQ(test::openSides(surface.mesh), 0U);
   EXPECT_NEAR(test::volumeOf(surface.mesh), 1600, 16);
 }
 
@@ -129,7 +114,7 @@ TEST(WindingSurface, PartsTrianglesOfAnyPlaceAsTheirNumberDoes) {
   for (const unsigned seed : {1U, 2U}) {
     const Mesh loose = randomTriangles(seed, 24);
     const WindingSurface surface = windingSurface(loose, {}, 200'000);
-    EXPECT_EQ(openSides(surface.mesh), 0U);
+    EXPECT_EQ(test::openSides(surface.mesh), 0U);
     EXPECT_LT(shareOfWrongSides(loose, surface.mesh, 20'000, surface.turned ? -1 : 1), 0.01);
   }
 }
@@ -140,7 +125,7 @@ TEST(WindingSurface, FillsAHoleWhereTheNumberIsAHalf) {
     return sphere.vertices[t[0]].z() + sphere.vertices[t[1]].z() + sphere.vertices[t[2]].z() > 11;
   });
   const WindingSurface surface = windingSurface(sphere, {}, few_leaves);
-  EXPECT_EQ(openSides(surface.mesh), 0U);
+  EXPECT_EQ(test::openSides(surface.mesh), 0U);
   EXPECT_LT(shareOfWrongSides(sphere, surface.mesh, 20'000), 0.002);
 }
 

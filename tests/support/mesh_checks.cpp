@@ -1,5 +1,6 @@
 #include "tests/support/mesh_checks.h"
 
+#include <algorithm>
 #include <map>
 #include <utility>
 #include <vector>
@@ -32,6 +33,19 @@ std::string firstFlaw(const Mesh& mesh) {
     if (met != ring.size()) return "the triangles at a vertex form more than one ring";
   }
   return "";
+}
+
+std::size_t openSides(const Mesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> surplus;
+  for (const Mesh::Triangle& t : mesh.triangles)
+    for (std::size_t side = 0; side < 3; ++side) {
+      const std::uint32_t a = t[side];
+      const std::uint32_t b = t[(side + 1) % 3];
+      surplus[std::minmax(a, b)] += a < b ? 1 : -1;
+    }
+  std::size_t open = 0;
+  for (const auto& [side, count] : surplus) open += count != 0;
+  return open;
 }
 
 int eulerCharacteristic(const Mesh& mesh) {

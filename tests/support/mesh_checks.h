@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 #include "vdbdither/mesh.h"
@@ -10,6 +11,9 @@ namespace vdbdither::test {
 /// a triangle is met by exactly one other in the opposite direction, and the triangles at a vertex
 /// form one ring.
 std::string firstFlaw(const Mesh& mesh);
+
+/// How many sides are not met by as many in the opposite direction.
+std::size_t openSides(const Mesh& mesh);
 
 /// Vertices − edges + faces: 2 for every sphere, 0 for every torus.
 int eulerCharacteristic(const Mesh& mesh);
