@@ -3,7 +3,7 @@
 #include "commands/command.h"
 #include "commands/manual.h"
 #include "io/staged_output.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -7,7 +7,7 @@
 #include "commands/command.h"
 #include "io/printer_profile.h"
 #include "io/standard_streams.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

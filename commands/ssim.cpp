@@ -15,7 +15,7 @@
 #include "io/staged_output.h"
 #include "io/standard_streams.h"
 #include "ops/kernels/picture_similarity.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -11,7 +11,7 @@
 #include <ImfOutputFile.h>
 #include <ImfTiledOutputFile.h>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

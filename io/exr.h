@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/run_image.h"
+#include "vdbdither/model/run_image.h"
 
 namespace vdbdither {
 

@@ -11,10 +11,10 @@
 
 #include "io/archive_digest.h"
 #include "io/pipe_input.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/interrupt.h"
-#include "vdbdither/layers.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
+#include "vdbdither/model/layers.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "io/vdb.h"
-#include "vdbdither/slab.h"
+#include "vdbdither/model/slab.h"
 
 namespace vdbdither {
 

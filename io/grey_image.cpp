@@ -14,7 +14,7 @@
 #include <ImfInputFile.h>
 #include <png.h>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -6,8 +6,8 @@
 #include "io/digest.h"
 #include "io/staged_output.h"
 #include "io/vdb.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

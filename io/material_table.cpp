@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "vdbdither/printer.h"
+#include "vdbdither/model/printer.h"
 
 namespace vdbdither {
 

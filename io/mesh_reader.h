@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

@@ -14,7 +14,7 @@
 
 #include "io/staged_output.h"
 #include "io/text_cursor.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

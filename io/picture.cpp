@@ -7,7 +7,7 @@
 #include <png.h>
 
 #include "io/png_decoder.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -6,8 +6,8 @@
 #include <poll.h>
 #include <unistd.h>
 
-#include "vdbdither/errors.h"
-#include "vdbdither/interrupt.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 

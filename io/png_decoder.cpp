@@ -7,7 +7,7 @@
 
 #include <png.h>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

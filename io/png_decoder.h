@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "io/run_image.h"
+#include "vdbdither/model/run_image.h"
 
 namespace vdbdither {
 

@@ -15,7 +15,7 @@
 #include <zlib.h>
 
 #include "io/deflate_writer.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -7,7 +7,7 @@
 #include <openvdb/Types.h>
 
 #include "io/mesh_formats.h"
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/data_files.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 #include "vdbdither/options.h"
 
 namespace vdbdither {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/printer.h"
+#include "vdbdither/model/printer.h"
 
 namespace vdbdither {
 

@@ -8,10 +8,10 @@
 
 #include "io/pipe_input.h"
 #include "io/vdb.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/layers.h"
-#include "vdbdither/openvdb.h"
-#include "vdbdither/visit_grid.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/layers.h"
+#include "vdbdither/model/openvdb.h"
+#include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "io/frames.h"
-#include "vdbdither/slab.h"
+#include "vdbdither/model/slab.h"
 
 namespace vdbdither {
 

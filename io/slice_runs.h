@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
-#include "io/run_image.h"
-#include "vdbdither/lattice.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/run_image.h"
+#include "vdbdither/model/lattice.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

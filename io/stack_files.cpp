@@ -4,7 +4,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -11,7 +11,7 @@
 #include <system_error>
 #include <unistd.h>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

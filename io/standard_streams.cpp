@@ -5,8 +5,8 @@
 #include <string>
 #include <unistd.h>
 
-#include "vdbdither/errors.h"
-#include "vdbdither/interrupt.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 

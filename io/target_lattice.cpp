@@ -5,7 +5,7 @@
 
 #include "io/printer_profile.h"
 #include "vdbdither/comma_list.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 #include "vdbdither/options.h"
 
 namespace vdbdither {

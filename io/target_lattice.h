@@ -4,7 +4,7 @@
 
 #include <openvdb/Types.h>
 
-#include "vdbdither/schema.h"
+#include "vdbdither/model/schema.h"
 
 namespace vdbdither {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <tiffio.h>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "io/run_image.h"
+#include "vdbdither/model/run_image.h"
 
 namespace vdbdither {
 

@@ -15,8 +15,8 @@
 #include <openvdb/tools/ChangeBackground.h>
 
 #include "io/archive_digest.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/options.h"
 
 namespace vdbdither {

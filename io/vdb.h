@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "vdbdither/schema.h"
+#include "vdbdither/model/schema.h"
 
 namespace vdbdither {
 

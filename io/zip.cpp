@@ -8,7 +8,7 @@
 #include <utility>
 #include <zlib.h>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

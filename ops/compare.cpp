@@ -7,9 +7,9 @@
 #include "io/slab_reader.h"
 #include "ops/kernels/grid_difference.h"
 #include "vdbdither/comma_list.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/layers.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/layers.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

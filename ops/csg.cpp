@@ -5,8 +5,8 @@
 
 #include "io/slab_reader.h"
 #include "ops/kernels/part_index.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/find_grid.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/find_grid.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

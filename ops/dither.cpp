@@ -10,7 +10,7 @@
 #include "ops/kernels/shape_dither.h"
 #include "ops/kernels/solid.h"
 #include "ops/kernels/threshold_mask.h"
-#include "vdbdither/find_grid.h"
+#include "vdbdither/model/find_grid.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

@@ -10,11 +10,11 @@
 #include "io/printer_profile.h"
 #include "io/vdb.h"
 #include "ops/kernels/grid_summary.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 #include "vdbdither/run_options.h"
-#include "vdbdither/visit_grid.h"
+#include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "ops/kernels/solid.h"
-#include "vdbdither/find_grid.h"
+#include "vdbdither/model/find_grid.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

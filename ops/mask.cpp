@@ -5,7 +5,7 @@
 
 #include "ops/kernels/gradient_noise.h"
 #include "ops/kernels/mask_tile.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

@@ -8,9 +8,9 @@
 
 #include "io/staged_output.h"
 #include "ops/kernels/slice_spectrum.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/find_grid.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

@@ -10,9 +10,9 @@
 #include "io/printer_profile.h"
 #include "ops/kernels/depth_bands.h"
 #include "vdbdither/comma_list.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/find_grid.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

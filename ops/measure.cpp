@@ -20,8 +20,8 @@
 #include "ops/kernels/surface_error.h"
 #include "ops/kernels/taubin.h"
 #include "ops/kernels/voxel_components.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

@@ -10,8 +10,8 @@
 #include "ops/kernels/mesh_repair.h"
 #include "ops/kernels/part_index.h"
 #include "ops/kernels/winding_surface.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

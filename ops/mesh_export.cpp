@@ -6,8 +6,8 @@
 #include "io/mesh_writer.h"
 #include "ops/kernels/grid_surface.h"
 #include "ops/kernels/taubin.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

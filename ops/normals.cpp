@@ -1,5 +1,5 @@
 #include "ops/kernels/gradient.h"
-#include "vdbdither/find_grid.h"
+#include "vdbdither/model/find_grid.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

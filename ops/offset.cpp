@@ -7,8 +7,8 @@
 #include "ops/kernels/held_band.h"
 #include "ops/kernels/surface_leaves.h"
 #include "ops/kernels/surface_offset.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/find_grid.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/find_grid.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

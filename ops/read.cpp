@@ -2,8 +2,8 @@
 
 #include "io/slab_reader.h"
 #include "vdbdither/comma_list.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/layers.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/layers.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

@@ -14,8 +14,8 @@
 #include "ops/kernels/grid_surface.h"
 #include "ops/kernels/ray_picture.h"
 #include "ops/kernels/voxel_faces.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

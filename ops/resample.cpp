@@ -11,8 +11,8 @@
 #include "ops/kernels/held_band.h"
 #include "ops/kernels/mesh_placement.h"
 #include "ops/kernels/zero_set_distance.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

@@ -5,9 +5,9 @@
 #include "io/printer_profile.h"
 #include "ops/kernels/gaussian_spread.h"
 #include "vdbdither/comma_list.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/find_grid.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

@@ -17,9 +17,9 @@
 #include "io/stack_files.h"
 #include "io/stack_preview.h"
 #include "io/tiff.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/find_grid.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 #include "vdbdither/version.h"
 

@@ -15,8 +15,8 @@
 #include "io/slice_runs.h"
 #include "io/stack_files.h"
 #include "io/tiff.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

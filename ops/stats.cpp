@@ -8,10 +8,10 @@
 #include "io/slice_runs.h"
 #include "ops/kernels/histogram.h"
 #include "ops/kernels/surface_area.h"
-#include "vdbdither/find_grid.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
-#include "vdbdither/visit_grid.h"
+#include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
 

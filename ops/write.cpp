@@ -11,11 +11,11 @@
 #include "io/staged_output.h"
 #include "io/standard_streams.h"
 #include "io/vdb.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/layers.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/layers.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
-#include "vdbdither/visit_grid.h"
+#include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
 

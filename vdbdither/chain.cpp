@@ -2,7 +2,7 @@
 
 #include <cctype>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

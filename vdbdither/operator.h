@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "vdbdither/options.h"
-#include "vdbdither/schema.h"
+#include "vdbdither/model/schema.h"
 
 namespace vdbdither {
 

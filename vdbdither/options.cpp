@@ -10,7 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "vdbdither/comma_list.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -14,10 +14,10 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "vdbdither/errors.h"
-#include "vdbdither/interrupt.h"
-#include "vdbdither/layers.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
+#include "vdbdither/model/layers.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/registry.h"
 
 namespace vdbdither {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

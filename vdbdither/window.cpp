@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "vdbdither/layers.h"
+#include "vdbdither/model/layers.h"
 
 namespace vdbdither {
 

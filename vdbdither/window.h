@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "vdbdither/operator.h"
-#include "vdbdither/slab.h"
+#include "vdbdither/model/slab.h"
 
 namespace vdbdither {
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "ops/kernels/surface_error.h"
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

@@ -2,7 +2,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <span>
 
-#include "vdbdither/lattice.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/lattice.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

@@ -6,7 +6,7 @@
 
 #include "ops/kernels/leaf_bits.h"
 #include "ops/kernels/leaf_surroundings.h"
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

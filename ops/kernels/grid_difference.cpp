@@ -7,7 +7,7 @@
 #include <tuple>
 #include <type_traits>
 
-#include "vdbdither/visit_grid.h"
+#include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
 

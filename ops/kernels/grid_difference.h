@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

@@ -3,7 +3,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 
-#include "vdbdither/visit_grid.h"
+#include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <map>
 
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

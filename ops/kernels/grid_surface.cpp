@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "ops/kernels/iso_surface.h"
-#include "vdbdither/grid.h"
+#include "vdbdither/model/grid.h"
 
 namespace vdbdither {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

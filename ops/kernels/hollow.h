@@ -5,7 +5,7 @@
 #include <openvdb/openvdb.h>
 
 #include "ops/kernels/drain.h"
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

@@ -12,7 +12,7 @@
 
 #include "ops/kernels/marching_cubes.h"
 #include "ops/kernels/normal_distribution.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -6,8 +6,8 @@
 #include <openvdb/openvdb.h>
 
 #include "ops/kernels/bit_layers.h"
-#include "vdbdither/lattice.h"
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/lattice.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

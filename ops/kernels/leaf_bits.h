@@ -17,7 +17,7 @@
 #include <openvdb/openvdb.h>
 #include <tbb/parallel_for.h>
 
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

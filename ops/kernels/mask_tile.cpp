@@ -1,6 +1,6 @@
 #include "ops/kernels/mask_tile.h"
 
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

@@ -5,9 +5,9 @@
 
 #include "ops/kernels/leaf_distances.h"
 #include "ops/kernels/mesh_features.h"
-#include "vdbdither/lattice.h"
-#include "vdbdither/mesh.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/lattice.h"
+#include "vdbdither/model/mesh.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

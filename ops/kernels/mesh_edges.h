@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

@@ -9,7 +9,7 @@
 
 #include "ops/kernels/mesh_edges.h"
 #include "ops/kernels/swallowed_walls.h"
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

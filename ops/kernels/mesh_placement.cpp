@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

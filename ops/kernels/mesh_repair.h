@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

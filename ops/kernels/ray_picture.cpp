@@ -11,7 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/mesh_placement.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -6,7 +6,7 @@
 
 #include "ops/kernels/adapted_amplitude.h"
 #include "ops/kernels/threshold_mask.h"
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "vdbdither/lattice.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/lattice.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

@@ -7,7 +7,7 @@
 #include <openvdb/math/Vec3.h>
 
 #include "ops/kernels/closest_point.h"
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

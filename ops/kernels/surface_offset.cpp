@@ -13,7 +13,7 @@
 #include "ops/kernels/leaf_bits.h"
 #include "ops/kernels/solid.h"
 #include "ops/kernels/surface_leaves.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

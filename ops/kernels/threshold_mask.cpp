@@ -7,7 +7,7 @@
 
 #include <openvdb/tools/Dense.h>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -4,7 +4,7 @@
 
 #include "ops/kernels/bit_layers.h"
 #include "ops/kernels/iso_surface.h"
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

@@ -3,7 +3,7 @@
 #include <openvdb/openvdb.h>
 
 #include "ops/kernels/leaf_surroundings.h"
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

@@ -7,7 +7,7 @@
 #include <openvdb/Types.h>
 
 #include "ops/kernels/winding_number.h"
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

@@ -10,7 +10,7 @@
 #include "ops/kernels/grid_keys.h"
 #include "ops/kernels/winding_cell.h"
 #include "ops/kernels/winding_number.h"
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

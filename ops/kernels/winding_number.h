@@ -8,7 +8,7 @@
 #include <openvdb/math/BBox.h>
 #include <openvdb/math/Vec3.h>
 
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

@@ -29,7 +29,7 @@
 #include "ops/kernels/surface_error.h"
 #include "ops/kernels/triangle_and_cube.h"
 #include "ops/kernels/winding_cells.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <functional>
 
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 

@@ -6,8 +6,8 @@
 
 #include <openvdb/math/Mat4.h>
 
-#include "vdbdither/mesh.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/mesh.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

@@ -5,7 +5,7 @@
 
 #include "ops/kernels/mesh_distance.h"
 #include "ops/kernels/zero_set.h"
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

@@ -19,7 +19,7 @@ CONSUMER = {
     "consumer.cpp": """
         #include <cstdio>
 
-        #include "vdbdither/lattice.h"
+        #include "vdbdither/model/lattice.h"
         #include "vdbdither/registry.h"
         #include "vdbdither/version.h"
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

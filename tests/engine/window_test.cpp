@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 namespace {

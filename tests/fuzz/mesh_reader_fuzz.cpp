@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "io/mesh_formats.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

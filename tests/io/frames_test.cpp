@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "io/exr.h"
 #include "tests/support/scratch_folder.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

@@ -18,7 +18,7 @@
 #include "io/polygon.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/shapes.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither::test {
 namespace {

@@ -9,7 +9,7 @@
 #include "io/mesh_reader.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

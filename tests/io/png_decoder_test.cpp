@@ -5,7 +5,7 @@
 
 #include "io/png_runs.h"
 #include "tests/support/run_images.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

@@ -14,7 +14,7 @@
 #include "tests/support/png_reader.h"
 #include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/scratch_folder.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

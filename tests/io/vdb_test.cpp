@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/scratch_folder.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 namespace {

@@ -9,7 +9,7 @@
 #include "io/staged_output.h"
 #include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

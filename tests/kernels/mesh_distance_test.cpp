@@ -14,7 +14,7 @@
 #include "ops/kernels/mesh_features.h"
 #include "ops/kernels/winding_number.h"
 #include "tests/support/shapes.h"
-#include "vdbdither/layers.h"
+#include "vdbdither/model/layers.h"
 
 namespace vdbdither {
 namespace {

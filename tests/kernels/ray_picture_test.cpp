@@ -10,7 +10,7 @@
 
 #include "ops/kernels/mesh_placement.h"
 #include "tests/support/shapes.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

@@ -9,7 +9,7 @@
 #include "ops/kernels/shape_dither.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/volumes.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

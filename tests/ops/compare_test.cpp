@@ -9,7 +9,7 @@
 #include "tests/support/drawn_grids.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/sinks.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

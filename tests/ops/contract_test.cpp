@@ -11,7 +11,7 @@
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/chain.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/pipeline.h"
 #include "vdbdither/registry.h"
 

@@ -8,7 +8,7 @@
 #include "tests/support/filters.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/volumes.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

@@ -10,7 +10,7 @@
 #include "ops/kernels/threshold_mask.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/filters.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

@@ -4,7 +4,7 @@
 #include "ops/kernels/held_band.h"
 #include "tests/support/filters.h"
 #include "tests/support/volumes.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

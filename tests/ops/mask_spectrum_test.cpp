@@ -10,8 +10,8 @@
 
 #include "tests/support/drawn_grids.h"
 #include "tests/support/scratch_folder.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/registry.h"
 
 namespace vdbdither {

@@ -9,7 +9,7 @@
 #include <openvdb/openvdb.h>
 
 #include "ops/kernels/void_and_cluster.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 #include "vdbdither/registry.h"
 
 namespace vdbdither {

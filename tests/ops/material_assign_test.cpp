@@ -6,7 +6,7 @@
 #include "io/material_table.h"
 #include "io/printer_profile.h"
 #include "tests/support/drawn_grids.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 #include "vdbdither/operator.h"
 #include "vdbdither/registry.h"
 

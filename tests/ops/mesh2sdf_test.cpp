@@ -7,8 +7,8 @@
 
 #include "tests/support/shapes.h"
 #include "tests/support/told.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/operator.h"
 
 namespace vdbdither {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/filters.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

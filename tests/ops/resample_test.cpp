@@ -7,7 +7,7 @@
 #include "io/vdb.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/volumes.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 #include "vdbdither/operator.h"
 #include "vdbdither/registry.h"
 

@@ -3,7 +3,7 @@
 
 #include "io/printer_profile.h"
 #include "tests/support/filters.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

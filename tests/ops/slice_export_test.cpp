@@ -16,7 +16,7 @@
 #include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/told.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 #include "vdbdither/operator.h"
 #include "vdbdither/registry.h"
 

@@ -14,8 +14,8 @@
 #include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/told.h"
-#include "vdbdither/errors.h"
-#include "vdbdither/layers.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/layers.h"
 #include "vdbdither/registry.h"
 
 namespace vdbdither {

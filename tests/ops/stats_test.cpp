@@ -9,7 +9,7 @@
 #include "tests/support/drawn_grids.h"
 #include "tests/support/sinks.h"
 #include "tests/support/volumes.h"
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

@@ -1,8 +1,8 @@
 #include "tests/support/contract.h"
 
 #include "io/vdb.h"
-#include "vdbdither/layers.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/layers.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/window.h"
 
 namespace vdbdither::test {

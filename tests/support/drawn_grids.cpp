@@ -1,6 +1,6 @@
 #include "tests/support/drawn_grids.h"
 
-#include "vdbdither/layers.h"
+#include "vdbdither/model/layers.h"
 
 namespace vdbdither::test {
 

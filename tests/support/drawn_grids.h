@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/openvdb.h"
-#include "vdbdither/schema.h"
-#include "vdbdither/slab.h"
+#include "vdbdither/model/openvdb.h"
+#include "vdbdither/model/schema.h"
+#include "vdbdither/model/slab.h"
 
 namespace vdbdither::test {
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <string>
 
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither::test {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "vdbdither/mesh.h"
+#include "vdbdither/model/mesh.h"
 
 namespace vdbdither::test {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "io/run_image.h"
+#include "vdbdither/model/run_image.h"
 
 namespace vdbdither::test {
 

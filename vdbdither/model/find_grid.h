@@ -6,8 +6,8 @@
 
 #include <openvdb/openvdb.h>
 
-#include "vdbdither/errors.h"
-#include "vdbdither/slab.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/slab.h"
 
 namespace vdbdither {
 

@@ -3,8 +3,8 @@
 #include <map>
 #include <string>
 
-#include "vdbdither/grid.h"
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/grid.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "vdbdither/interrupt.h"
+#include "vdbdither/model/interrupt.h"
 
 #include <csignal>
 #include <cstring>

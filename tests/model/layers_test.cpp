@@ -1,11 +1,11 @@
-#include "vdbdither/layers.h"
+#include "vdbdither/model/layers.h"
 
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 namespace {

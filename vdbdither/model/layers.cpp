@@ -1,4 +1,4 @@
-#include "vdbdither/layers.h"
+#include "vdbdither/model/layers.h"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/parallel_for.h>
 
-#include "vdbdither/openvdb.h"
-#include "vdbdither/visit_grid.h"
+#include "vdbdither/model/openvdb.h"
+#include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
 

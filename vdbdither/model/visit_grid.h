@@ -1,7 +1,7 @@
 #pragma once
 
-#include "vdbdither/errors.h"
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 

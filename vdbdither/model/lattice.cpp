@@ -1,4 +1,4 @@
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/lattice.h"
 
 #include <algorithm>
 

@@ -2,8 +2,8 @@
 
 #include <span>
 
-#include "vdbdither/grid.h"
-#include "vdbdither/lattice.h"
+#include "vdbdither/model/grid.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
 

@@ -3,7 +3,7 @@
 #include <map>
 #include <string>
 
-#include "vdbdither/slab.h"
+#include "vdbdither/model/slab.h"
 
 namespace vdbdither {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "vdbdither/errors.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "vdbdither/openvdb.h"
+#include "vdbdither/model/openvdb.h"
 
 #ifdef VDBDITHER_WHOLE_GRIDS
 // libopenvdb.so lacks the members that its own compiler put in line everywhere. One that puts less
