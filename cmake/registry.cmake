@@ -17,7 +17,7 @@ function(generate_registry result)
   endforeach()
   set(output ${CMAKE_BINARY_DIR}/generated/registry.cpp)
   file(CONFIGURE OUTPUT ${output} @ONLY CONTENT
-"#include \"vdbdither/registry.h\"
+"#include \"vdbdither/engine/registry.h\"
 
 #include <iterator>
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "vdbdither/options.h"
+#include "vdbdither/engine/options.h"
 
 namespace vdbdither {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 
-#include "vdbdither/registry.h"
-#include "vdbdither/run_options.h"
+#include "vdbdither/engine/registry.h"
+#include "vdbdither/engine/run_options.h"
 #include "vdbdither/version.h"
 
 namespace vdbdither {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "commands/command.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -9,7 +9,7 @@
 
 #include "io/data_files.h"
 #include "vdbdither/model/errors.h"
-#include "vdbdither/options.h"
+#include "vdbdither/engine/options.h"
 
 namespace vdbdither {
 

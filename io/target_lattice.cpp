@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "io/printer_profile.h"
-#include "vdbdither/comma_list.h"
+#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
-#include "vdbdither/options.h"
+#include "vdbdither/engine/options.h"
 
 namespace vdbdither {
 

@@ -17,7 +17,7 @@
 #include "io/archive_digest.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/options.h"
+#include "vdbdither/engine/options.h"
 
 namespace vdbdither {
 

@@ -6,11 +6,11 @@
 
 #include "io/slab_reader.h"
 #include "ops/kernels/grid_difference.h"
-#include "vdbdither/comma_list.h"
+#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

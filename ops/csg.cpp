@@ -7,7 +7,7 @@
 #include "ops/kernels/part_index.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -11,7 +11,7 @@
 #include "ops/kernels/solid.h"
 #include "ops/kernels/threshold_mask.h"
 #include "vdbdither/model/find_grid.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

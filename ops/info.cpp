@@ -12,8 +12,8 @@
 #include "ops/kernels/grid_summary.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/operator.h"
-#include "vdbdither/run_options.h"
+#include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/run_options.h"
 #include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {

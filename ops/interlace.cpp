@@ -4,7 +4,7 @@
 
 #include "ops/kernels/solid.h"
 #include "vdbdither/model/find_grid.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

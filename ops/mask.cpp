@@ -6,7 +6,7 @@
 #include "ops/kernels/gradient_noise.h"
 #include "ops/kernels/mask_tile.h"
 #include "vdbdither/model/errors.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

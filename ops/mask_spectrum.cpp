@@ -11,7 +11,7 @@
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -9,11 +9,11 @@
 #include "io/material_table.h"
 #include "io/printer_profile.h"
 #include "ops/kernels/depth_bands.h"
-#include "vdbdither/comma_list.h"
+#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -12,7 +12,7 @@
 #include "ops/kernels/winding_surface.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

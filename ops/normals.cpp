@@ -1,6 +1,6 @@
 #include "ops/kernels/gradient.h"
 #include "vdbdither/model/find_grid.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -9,7 +9,7 @@
 #include "ops/kernels/surface_offset.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -1,10 +1,10 @@
 #include <unistd.h>
 
 #include "io/slab_reader.h"
-#include "vdbdither/comma_list.h"
+#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -4,11 +4,11 @@
 
 #include "io/printer_profile.h"
 #include "ops/kernels/gaussian_spread.h"
-#include "vdbdither/comma_list.h"
+#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

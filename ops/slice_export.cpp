@@ -20,7 +20,7 @@
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/version.h"
 
 namespace vdbdither {

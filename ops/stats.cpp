@@ -10,7 +10,7 @@
 #include "ops/kernels/surface_area.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {

@@ -14,7 +14,7 @@
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {

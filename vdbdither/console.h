@@ -3,7 +3,7 @@
 #include <chrono>
 #include <string>
 
-#include "vdbdither/pipeline.h"
+#include "vdbdither/engine/pipeline.h"
 
 namespace vdbdither {
 

@@ -12,12 +12,12 @@
 #include "commands/manual.h"
 #include "io/standard_streams.h"
 #include "io/vdb.h"
-#include "vdbdither/chain.h"
+#include "vdbdither/engine/chain.h"
 #include "vdbdither/console.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
-#include "vdbdither/pipeline.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/pipeline.h"
+#include "vdbdither/engine/registry.h"
 #include "vdbdither/version.h"
 
 namespace vdbdither {

@@ -20,7 +20,7 @@
 #include "ops/kernels/shape_dither.h"
 #include "ops/kernels/voxel_diameter.h"
 #include "tests/support/volumes.h"
-#include "vdbdither/options.h"
+#include "vdbdither/engine/options.h"
 
 namespace vdbdither {
 namespace {

@@ -20,7 +20,7 @@ CONSUMER = {
         #include <cstdio>
 
         #include "vdbdither/model/lattice.h"
-        #include "vdbdither/registry.h"
+        #include "vdbdither/engine/registry.h"
         #include "vdbdither/version.h"
 
         int main() {

@@ -1,4 +1,4 @@
-#include "vdbdither/chain.h"
+#include "vdbdither/engine/chain.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "vdbdither/options.h"
+#include "vdbdither/engine/options.h"
 
 #include <cmath>
 

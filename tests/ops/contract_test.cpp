@@ -10,10 +10,10 @@
 #include "tests/support/mesh_files.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"
-#include "vdbdither/chain.h"
+#include "vdbdither/engine/chain.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/pipeline.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/pipeline.h"
+#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 namespace {

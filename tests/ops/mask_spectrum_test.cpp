@@ -12,7 +12,7 @@
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 namespace {

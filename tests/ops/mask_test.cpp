@@ -10,7 +10,7 @@
 
 #include "ops/kernels/void_and_cluster.h"
 #include "vdbdither/model/errors.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 namespace {

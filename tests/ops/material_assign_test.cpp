@@ -7,8 +7,8 @@
 #include "io/printer_profile.h"
 #include "tests/support/drawn_grids.h"
 #include "vdbdither/model/errors.h"
-#include "vdbdither/operator.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 namespace {

@@ -8,8 +8,8 @@
 #include "tests/support/scratch_folder.h"
 #include "tests/support/volumes.h"
 #include "vdbdither/model/errors.h"
-#include "vdbdither/operator.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 namespace {

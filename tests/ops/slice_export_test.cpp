@@ -17,8 +17,8 @@
 #include "tests/support/scratch_folder.h"
 #include "tests/support/told.h"
 #include "vdbdither/model/errors.h"
-#include "vdbdither/operator.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 namespace {

@@ -16,7 +16,7 @@
 #include "tests/support/told.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 namespace {

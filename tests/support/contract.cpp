@@ -3,7 +3,7 @@
 #include "io/vdb.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/window.h"
+#include "vdbdither/engine/window.h"
 
 namespace vdbdither::test {
 

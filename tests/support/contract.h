@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither::test {
 

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "vdbdither/options.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/options.h"
+#include "vdbdither/engine/registry.h"
 
 namespace vdbdither::test {
 

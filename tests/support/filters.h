@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tests/support/volumes.h"
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither::test {
 

@@ -1,7 +1,7 @@
 #include "tests/support/sinks.h"
 
 #include "tests/support/drawn_grids.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/registry.h"
 
 namespace vdbdither::test {
 

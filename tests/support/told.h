@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither::test {
 

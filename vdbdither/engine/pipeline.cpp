@@ -1,4 +1,4 @@
-#include "vdbdither/pipeline.h"
+#include "vdbdither/engine/pipeline.h"
 
 #include <algorithm>
 #include <chrono>
@@ -18,7 +18,7 @@
 #include "vdbdither/model/interrupt.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "vdbdither/options.h"
+#include "vdbdither/engine/options.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "vdbdither/comma_list.h"
+#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/slab.h"
 
 namespace vdbdither {

@@ -1,4 +1,4 @@
-#include "vdbdither/registry.h"
+#include "vdbdither/engine/registry.h"
 
 #include <string>
 #include <vector>

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "vdbdither/options.h"
+#include "vdbdither/engine/options.h"
 
 namespace vdbdither {
 

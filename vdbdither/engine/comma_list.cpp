@@ -1,4 +1,4 @@
-#include "vdbdither/comma_list.h"
+#include "vdbdither/engine/comma_list.h"
 
 namespace vdbdither {
 

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/chain.h"
-#include "vdbdither/operator.h"
-#include "vdbdither/run_options.h"
-#include "vdbdither/window.h"
+#include "vdbdither/engine/chain.h"
+#include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/run_options.h"
+#include "vdbdither/engine/window.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "vdbdither/run_options.h"
+#include "vdbdither/engine/run_options.h"
 
 #include <algorithm>
 #include <array>

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "vdbdither/options.h"
+#include "vdbdither/engine/options.h"
 #include "vdbdither/model/schema.h"
 
 namespace vdbdither {

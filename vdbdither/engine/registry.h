@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "vdbdither/operator.h"
+#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "vdbdither/window.h"
+#include "vdbdither/engine/window.h"
 
 #include <algorithm>
 
