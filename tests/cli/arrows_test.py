@@ -30,7 +30,7 @@ class Arrows(unittest.TestCase):
         self.assert_includes("vdbdither", "vdbdither/", but=("main.cpp",))
 
     def test_the_main_program_knows_no_operator(self):
-        self.assertEqual([name for name in included(ROOT / "vdbdither/main.cpp") if name.startswith("ops/")], [])
+        self.assertEqual([name for name in included(ROOT / "vdbdither/program/main.cpp") if name.startswith("ops/")], [])
 
     def test_io_knows_no_operator(self):
         self.assert_includes("io", "io/", "vdbdither/")

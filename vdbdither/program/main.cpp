@@ -13,7 +13,7 @@
 #include "io/standard_streams.h"
 #include "io/vdb.h"
 #include "vdbdither/engine/chain.h"
-#include "vdbdither/console.h"
+#include "vdbdither/program/console.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
 #include "vdbdither/engine/pipeline.h"

@@ -1,4 +1,4 @@
-#include "vdbdither/console.h"
+#include "vdbdither/program/console.h"
 
 #include <array>
 #include <cmath>
