@@ -4,7 +4,7 @@
 #include <string>
 
 #include "io/slab_reader.h"
-#include "ops/kernels/part_index.h"
+#include "ops/kernels/leaf/part_index.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/engine/operator.h"

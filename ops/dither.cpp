@@ -8,7 +8,7 @@
 #include "io/vdb.h"
 #include "ops/kernels/mask_tile.h"
 #include "ops/kernels/shape_dither.h"
-#include "ops/kernels/solid.h"
+#include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/threshold_mask.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/engine/operator.h"

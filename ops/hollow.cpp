@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/held_band.h"
-#include "ops/kernels/surface_leaves.h"
+#include "ops/kernels/leaf/held_band.h"
+#include "ops/kernels/leaf/surface_leaves.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/engine/operator.h"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "ops/kernels/solid.h"
+#include "ops/kernels/leaf/solid.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/engine/operator.h"
 

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "io/grey_image.h"
-#include "ops/kernels/held_band.h"
-#include "ops/kernels/surface_leaves.h"
+#include "ops/kernels/leaf/held_band.h"
+#include "ops/kernels/leaf/surface_leaves.h"
 #include "ops/kernels/surface_offset.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"

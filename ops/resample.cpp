@@ -8,7 +8,7 @@
 #include "io/frames.h"
 #include "io/target_lattice.h"
 #include "io/vdb.h"
-#include "ops/kernels/held_band.h"
+#include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/mesh_placement.h"
 #include "ops/kernels/zero_set_distance.h"
 #include "vdbdither/model/errors.h"

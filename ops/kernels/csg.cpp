@@ -8,10 +8,10 @@
 
 #include <openvdb/tools/Prune.h>
 
-#include "ops/kernels/held_band.h"
-#include "ops/kernels/leaf_bits.h"
-#include "ops/kernels/solid.h"
-#include "ops/kernels/surface_leaves.h"
+#include "ops/kernels/leaf/held_band.h"
+#include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/solid.h"
+#include "ops/kernels/leaf/surface_leaves.h"
 
 namespace vdbdither {
 

@@ -8,8 +8,8 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/bit_layers.h"
-#include "ops/kernels/leaf_bits.h"
+#include "ops/kernels/leaf/bit_layers.h"
+#include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/normal_distribution.h"
 
 namespace vdbdither {

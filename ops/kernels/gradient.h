@@ -4,8 +4,8 @@
 
 #include <openvdb/openvdb.h>
 
-#include "ops/kernels/leaf_bits.h"
-#include "ops/kernels/leaf_surroundings.h"
+#include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/leaf_surroundings.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "ops/kernels/leaf_bits.h"
-#include "ops/kernels/surface_leaves.h"
+#include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/surface_leaves.h"
 
 namespace vdbdither {
 

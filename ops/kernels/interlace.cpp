@@ -5,8 +5,8 @@
 
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/leaf_bits.h"
-#include "ops/kernels/solid.h"
+#include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/solid.h"
 
 namespace vdbdither {
 

@@ -5,7 +5,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "ops/kernels/bit_layers.h"
+#include "ops/kernels/leaf/bit_layers.h"
 #include "vdbdither/model/lattice.h"
 #include "vdbdither/model/mesh.h"
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "ops/kernels/leaf_bits.h"
+#include "ops/kernels/leaf/leaf_bits.h"
 
 namespace vdbdither {
 

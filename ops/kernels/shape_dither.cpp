@@ -12,8 +12,8 @@
 
 #include "ops/kernels/closest_surface_voxel.h"
 #include "ops/kernels/gradient.h"
-#include "ops/kernels/leaf_bits.h"
-#include "ops/kernels/solid.h"
+#include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/voxel_diameter.h"
 #include "ops/kernels/wall_guard.h"
 

@@ -10,9 +10,9 @@
 
 #include "ops/kernels/closest_surface_voxel.h"
 #include "ops/kernels/gradient.h"
-#include "ops/kernels/leaf_bits.h"
-#include "ops/kernels/solid.h"
-#include "ops/kernels/surface_leaves.h"
+#include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/solid.h"
+#include "ops/kernels/leaf/surface_leaves.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "ops/kernels/bit_layers.h"
+#include "ops/kernels/leaf/bit_layers.h"
 
 namespace vdbdither {
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "ops/kernels/bit_layers.h"
+#include "ops/kernels/leaf/bit_layers.h"
 #include "ops/kernels/iso_surface.h"
 #include "vdbdither/model/lattice.h"
 

@@ -2,7 +2,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "ops/kernels/leaf_surroundings.h"
+#include "ops/kernels/leaf/leaf_surroundings.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {

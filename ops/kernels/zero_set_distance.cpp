@@ -7,7 +7,7 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/solid.h"
+#include "ops/kernels/leaf/solid.h"
 
 namespace vdbdither {
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ops/kernels/held_band.h"
+#include "ops/kernels/leaf/held_band.h"
 #include "tests/support/volumes.h"
 
 namespace vdbdither {

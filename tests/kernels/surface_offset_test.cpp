@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "ops/kernels/held_band.h"
+#include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/shape_dither.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/volumes.h"

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "io/vdb.h"
-#include "ops/kernels/part_index.h"
+#include "ops/kernels/leaf/part_index.h"
 #include "tests/support/filters.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/volumes.h"

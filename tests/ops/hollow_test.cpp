@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "ops/kernels/held_band.h"
+#include "ops/kernels/leaf/held_band.h"
 #include "tests/support/filters.h"
 #include "tests/support/volumes.h"
 #include "vdbdither/model/errors.h"

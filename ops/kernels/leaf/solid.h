@@ -5,7 +5,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "ops/kernels/leaf_bits.h"
+#include "ops/kernels/leaf/leaf_bits.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {

@@ -1,4 +1,4 @@
-#include "ops/kernels/solid.h"
+#include "ops/kernels/leaf/solid.h"
 
 #include <algorithm>
 

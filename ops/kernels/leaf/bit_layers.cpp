@@ -1,4 +1,4 @@
-#include "ops/kernels/bit_layers.h"
+#include "ops/kernels/leaf/bit_layers.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/leaf_bits.h"
+#include "ops/kernels/leaf/leaf_bits.h"
 
 namespace vdbdither {
 

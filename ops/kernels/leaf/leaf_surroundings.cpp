@@ -1,4 +1,4 @@
-#include "ops/kernels/leaf_surroundings.h"
+#include "ops/kernels/leaf/leaf_surroundings.h"
 
 #ifdef __SSE2__
 #include <emmintrin.h>

@@ -1,11 +1,11 @@
-#include "ops/kernels/surface_leaves.h"
+#include "ops/kernels/leaf/surface_leaves.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <openvdb/tools/Prune.h>
 
-#include "ops/kernels/held_band.h"
+#include "ops/kernels/leaf/held_band.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "ops/kernels/part_index.h"
+#include "ops/kernels/leaf/part_index.h"
 
 #include <array>
 
