@@ -5,7 +5,7 @@
 
 #include "io/mesh_writer.h"
 #include "ops/kernels/grid_surface.h"
-#include "ops/kernels/taubin.h"
+#include "ops/kernels/mesh/taubin.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/operator.h"

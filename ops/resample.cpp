@@ -9,7 +9,7 @@
 #include "io/target_lattice.h"
 #include "io/vdb.h"
 #include "ops/kernels/leaf/held_band.h"
-#include "ops/kernels/mesh_placement.h"
+#include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/zero_set_distance.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"

@@ -10,7 +10,7 @@
 #include <openvdb/math/Mat3.h>
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/mesh_edges.h"
+#include "ops/kernels/mesh/mesh_edges.h"
 
 namespace vdbdither {
 

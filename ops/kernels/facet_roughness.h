@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "ops/kernels/closest_point.h"
+#include "ops/kernels/mesh/closest_point.h"
 #include "ops/kernels/surface_error.h"
 
 namespace vdbdither {

@@ -15,7 +15,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/closest_point.h"
+#include "ops/kernels/mesh/closest_point.h"
 
 namespace vdbdither {
 

@@ -7,8 +7,8 @@
 
 #include <openvdb/math/Vec3.h>
 
-#include "ops/kernels/mesh_edges.h"
-#include "ops/kernels/swallowed_walls.h"
+#include "ops/kernels/mesh/mesh_edges.h"
+#include "ops/kernels/mesh/swallowed_walls.h"
 #include "vdbdither/model/mesh.h"
 
 namespace vdbdither {

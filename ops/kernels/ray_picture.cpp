@@ -10,7 +10,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/mesh_placement.h"
+#include "ops/kernels/mesh/mesh_placement.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

@@ -6,7 +6,7 @@
 
 #include <openvdb/math/Vec3.h>
 
-#include "ops/kernels/closest_point.h"
+#include "ops/kernels/mesh/closest_point.h"
 #include "vdbdither/model/mesh.h"
 
 namespace vdbdither {

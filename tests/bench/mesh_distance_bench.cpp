@@ -15,7 +15,7 @@
 
 #include "io/mesh_reader.h"
 #include "ops/kernels/mesh_distance.h"
-#include "ops/kernels/mesh_repair.h"
+#include "ops/kernels/mesh/mesh_repair.h"
 
 namespace {
 

@@ -13,10 +13,10 @@
 
 #include "io/mesh_reader.h"
 #include "ops/kernels/mesh_distance.h"
-#include "ops/kernels/mesh_repair.h"
-#include "ops/kernels/swallowed_walls.h"
-#include "ops/kernels/winding_number.h"
-#include "ops/kernels/winding_surface.h"
+#include "ops/kernels/mesh/mesh_repair.h"
+#include "ops/kernels/mesh/swallowed_walls.h"
+#include "ops/kernels/mesh/winding_number.h"
+#include "ops/kernels/mesh/winding_surface.h"
 
 namespace {
 

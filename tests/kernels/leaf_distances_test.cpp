@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ops/kernels/closest_point.h"
+#include "ops/kernels/mesh/closest_point.h"
 
 namespace vdbdither {
 namespace {

@@ -12,7 +12,7 @@
 #include <tbb/global_control.h>
 
 #include "ops/kernels/mesh_features.h"
-#include "ops/kernels/winding_number.h"
+#include "ops/kernels/mesh/winding_number.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/model/layers.h"
 

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
-#include "ops/kernels/mesh_placement.h"
+#include "ops/kernels/mesh/mesh_placement.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/model/errors.h"
 

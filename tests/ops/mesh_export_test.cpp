@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "io/mesh_reader.h"
-#include "ops/kernels/mesh_repair.h"
+#include "ops/kernels/mesh/mesh_repair.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/filters.h"
 #include "tests/support/mesh_checks.h"

@@ -1,4 +1,4 @@
-#include "ops/kernels/hole_filling.h"
+#include "ops/kernels/mesh/hole_filling.h"
 
 #include <cmath>
 #include <map>
@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "ops/kernels/mesh_placement.h"
-#include "ops/kernels/winding_number.h"
+#include "ops/kernels/mesh/mesh_placement.h"
+#include "ops/kernels/mesh/winding_number.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/shapes.h"
 

@@ -1,4 +1,4 @@
-#include "ops/kernels/mesh_repair.h"
+#include "ops/kernels/mesh/mesh_repair.h"
 
 #include <cmath>
 #include <map>

@@ -1,4 +1,4 @@
-#include "ops/kernels/winding_surface.h"
+#include "ops/kernels/mesh/winding_surface.h"
 
 #include <cmath>
 #include <numbers>
@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "ops/kernels/winding_number.h"
+#include "ops/kernels/mesh/winding_number.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/shapes.h"
 

@@ -1,4 +1,4 @@
-#include "ops/kernels/triangle_and_cube.h"
+#include "ops/kernels/mesh/triangle_and_cube.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "ops/kernels/winding_number.h"
+#include "ops/kernels/mesh/winding_number.h"
 
 #include <cmath>
 #include <random>

@@ -1,11 +1,11 @@
-#include "ops/kernels/closest_point.h"
+#include "ops/kernels/mesh/closest_point.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
-#include "ops/kernels/mesh_edges.h"
+#include "ops/kernels/mesh/mesh_edges.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "ops/kernels/mesh_edges.h"
+#include "ops/kernels/mesh/mesh_edges.h"
 
 #include <algorithm>
 #include <utility>

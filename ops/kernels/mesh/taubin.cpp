@@ -1,4 +1,4 @@
-#include "ops/kernels/taubin.h"
+#include "ops/kernels/mesh/taubin.h"
 
 #include <cstddef>
 #include <cstdint>

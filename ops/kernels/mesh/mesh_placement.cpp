@@ -1,4 +1,4 @@
-#include "ops/kernels/mesh_placement.h"
+#include "ops/kernels/mesh/mesh_placement.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 
 #include <openvdb/Types.h>
 
-#include "ops/kernels/winding_number.h"
+#include "ops/kernels/mesh/winding_number.h"
 #include "vdbdither/model/mesh.h"
 
 namespace vdbdither {

@@ -1,4 +1,4 @@
-#include "ops/kernels/swallowed_walls.h"
+#include "ops/kernels/mesh/swallowed_walls.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 #include <openvdb/math/BBox.h>
 
 #include "ops/kernels/mesh_distance.h"
-#include "ops/kernels/mesh_placement.h"
-#include "ops/kernels/mesh_repair.h"
+#include "ops/kernels/mesh/mesh_placement.h"
+#include "ops/kernels/mesh/mesh_repair.h"
 #include "tests/support/shapes.h"
 
 namespace vdbdither {

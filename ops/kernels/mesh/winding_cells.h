@@ -7,9 +7,9 @@
 #include <openvdb/Types.h>
 #include <openvdb/math/BBox.h>
 
-#include "ops/kernels/grid_keys.h"
-#include "ops/kernels/winding_cell.h"
-#include "ops/kernels/winding_number.h"
+#include "ops/kernels/mesh/grid_keys.h"
+#include "ops/kernels/mesh/winding_cell.h"
+#include "ops/kernels/mesh/winding_number.h"
 #include "vdbdither/model/mesh.h"
 
 namespace vdbdither {

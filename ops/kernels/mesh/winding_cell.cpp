@@ -1,8 +1,8 @@
-#include "ops/kernels/winding_cell.h"
+#include "ops/kernels/mesh/winding_cell.h"
 
 #include <cmath>
 
-#include "ops/kernels/triangle_and_cube.h"
+#include "ops/kernels/mesh/triangle_and_cube.h"
 
 namespace vdbdither {
 

@@ -7,7 +7,7 @@
 // leaves of any size beside each other, whose dual is closed whatever their sizes (Ju, Losasso,
 // Schaefer, Warren: "Dual Contouring of Hermite Data", 2002).
 
-#include "ops/kernels/winding_surface.h"
+#include "ops/kernels/mesh/winding_surface.h"
 
 #include <algorithm>
 #include <array>
@@ -24,11 +24,11 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include "ops/kernels/grid_keys.h"
+#include "ops/kernels/mesh/grid_keys.h"
 #include "ops/kernels/marching_cubes.h"
 #include "ops/kernels/surface_error.h"
-#include "ops/kernels/triangle_and_cube.h"
-#include "ops/kernels/winding_cells.h"
+#include "ops/kernels/mesh/triangle_and_cube.h"
+#include "ops/kernels/mesh/winding_cells.h"
 #include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {

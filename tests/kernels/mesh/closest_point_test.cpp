@@ -1,4 +1,4 @@
-#include "ops/kernels/closest_point.h"
+#include "ops/kernels/mesh/closest_point.h"
 
 #include <cmath>
 #include <limits>

@@ -1,7 +1,7 @@
 // Whatever the triangles are, the sides that nothing meets from the other side form closed loops.
 // Filling these makes the mesh a cycle, for which the winding number is whole.
 
-#include "ops/kernels/mesh_repair.h"
+#include "ops/kernels/mesh/mesh_repair.h"
 
 #include <algorithm>
 #include <array>
@@ -13,10 +13,10 @@
 #include <tuple>
 #include <utility>
 
-#include "ops/kernels/hole_filling.h"
-#include "ops/kernels/mesh_edges.h"
+#include "ops/kernels/mesh/hole_filling.h"
+#include "ops/kernels/mesh/mesh_edges.h"
 #include "ops/kernels/surface_error.h"
-#include "ops/kernels/winding_number.h"
+#include "ops/kernels/mesh/winding_number.h"
 
 namespace vdbdither {
 

@@ -2,7 +2,7 @@
 // is below, and cut finer until the middles of its sides need not move. What a corner passes on its
 // way is on the right side afterwards wherever it stops.
 
-#include "ops/kernels/hole_filling.h"
+#include "ops/kernels/mesh/hole_filling.h"
 
 #include <algorithm>
 #include <array>
@@ -16,9 +16,9 @@
 #include <openvdb/Types.h>
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/mesh_edges.h"
+#include "ops/kernels/mesh/mesh_edges.h"
 #include "ops/kernels/surface_error.h"
-#include "ops/kernels/winding_number.h"
+#include "ops/kernels/mesh/winding_number.h"
 
 namespace vdbdither {
 

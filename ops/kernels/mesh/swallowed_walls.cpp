@@ -2,7 +2,7 @@
 // triangles intersect that does not change, so that a look at one triangle tells of all that hang
 // together; triangles that others pass through are cut along their planes first.
 
-#include "ops/kernels/swallowed_walls.h"
+#include "ops/kernels/mesh/swallowed_walls.h"
 
 #include <algorithm>
 #include <array>
@@ -14,8 +14,8 @@
 #include <openvdb/math/BBox.h>
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/mesh_edges.h"
-#include "ops/kernels/winding_number.h"
+#include "ops/kernels/mesh/mesh_edges.h"
+#include "ops/kernels/mesh/winding_number.h"
 
 namespace vdbdither {
 

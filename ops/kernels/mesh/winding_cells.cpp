@@ -1,4 +1,4 @@
-#include "ops/kernels/winding_cells.h"
+#include "ops/kernels/mesh/winding_cells.h"
 
 #include <array>
 

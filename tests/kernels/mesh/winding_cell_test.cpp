@@ -1,4 +1,4 @@
-#include "ops/kernels/winding_cell.h"
+#include "ops/kernels/mesh/winding_cell.h"
 
 #include <cmath>
 #include <random>
