@@ -5,7 +5,7 @@
 #include "io/printer_profile.h"
 #include "io/target_lattice.h"
 #include "ops/kernels/leaf/held_band.h"
-#include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/mesh_repair.h"
 #include "ops/kernels/leaf/part_index.h"

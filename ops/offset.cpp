@@ -6,7 +6,7 @@
 #include "io/grey_image.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/leaf/surface_leaves.h"
-#include "ops/kernels/surface_offset.h"
+#include "ops/kernels/distance/surface_offset.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/engine/operator.h"

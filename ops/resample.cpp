@@ -10,7 +10,7 @@
 #include "io/vdb.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/mesh/mesh_placement.h"
-#include "ops/kernels/zero_set_distance.h"
+#include "ops/kernels/distance/zero_set_distance.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/operator.h"

@@ -10,8 +10,8 @@
 #include <limits>
 #include <optional>
 
-#include "ops/kernels/closest_surface_voxel.h"
-#include "ops/kernels/gradient.h"
+#include "ops/kernels/distance/closest_surface_voxel.h"
+#include "ops/kernels/distance/gradient.h"
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/voxel_diameter.h"

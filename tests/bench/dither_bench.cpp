@@ -6,8 +6,8 @@
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
-#include "ops/kernels/closest_surface_voxel.h"
-#include "ops/kernels/gradient.h"
+#include "ops/kernels/distance/closest_surface_voxel.h"
+#include "ops/kernels/distance/gradient.h"
 #include "ops/kernels/interlace.h"
 #include "ops/kernels/shape_dither.h"
 

@@ -14,7 +14,7 @@
 #include <tbb/global_control.h>
 
 #include "io/mesh_reader.h"
-#include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/mesh/mesh_repair.h"
 
 namespace {

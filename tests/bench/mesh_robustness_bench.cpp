@@ -12,7 +12,7 @@
 #include <tbb/parallel_reduce.h>
 
 #include "io/mesh_reader.h"
-#include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/mesh/mesh_repair.h"
 #include "ops/kernels/mesh/swallowed_walls.h"
 #include "ops/kernels/mesh/winding_number.h"

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "ops/kernels/gradient.h"
-#include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/distance/gradient.h"
+#include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/voxel_diameter.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/shapes.h"

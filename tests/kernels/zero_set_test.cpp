@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ops/kernels/zero_set_distance.h"
+#include "ops/kernels/distance/zero_set_distance.h"
 #include "tests/support/volumes.h"
 
 namespace vdbdither {

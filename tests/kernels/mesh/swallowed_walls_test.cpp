@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/math/BBox.h>
 
-#include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/mesh_repair.h"
 #include "tests/support/shapes.h"

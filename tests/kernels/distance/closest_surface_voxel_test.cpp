@@ -1,4 +1,4 @@
-#include "ops/kernels/closest_surface_voxel.h"
+#include "ops/kernels/distance/closest_surface_voxel.h"
 
 #include <random>
 

@@ -1,4 +1,4 @@
-#include "ops/kernels/leaf_distances.h"
+#include "ops/kernels/distance/leaf_distances.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "ops/kernels/csg.h"
+#include "ops/kernels/distance/csg.h"
 
 #include <cmath>
 

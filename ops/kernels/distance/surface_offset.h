@@ -4,7 +4,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "ops/kernels/height_map.h"
+#include "ops/kernels/distance/height_map.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {

@@ -1,4 +1,4 @@
-#include "ops/kernels/height_map.h"
+#include "ops/kernels/distance/height_map.h"
 
 #include <algorithm>
 #include <cmath>

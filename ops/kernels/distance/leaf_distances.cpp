@@ -4,14 +4,14 @@
 // A region is convex: along z it is one interval. The intervals of four columns are found at once;
 // within them the distance takes no further test, but for the few voxels beside a triangle.
 
-#include "ops/kernels/leaf_distances.h"
+#include "ops/kernels/distance/leaf_distances.h"
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <limits>
 
-#include "ops/kernels/row_crossings.h"
+#include "ops/kernels/distance/row_crossings.h"
 
 namespace vdbdither {
 

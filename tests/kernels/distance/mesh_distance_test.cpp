@@ -1,4 +1,4 @@
-#include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/distance/mesh_distance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/global_control.h>
 
-#include "ops/kernels/mesh_features.h"
+#include "ops/kernels/distance/mesh_features.h"
 #include "ops/kernels/mesh/winding_number.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/model/layers.h"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <memory>
 
-#include "ops/kernels/leaf_distances.h"
-#include "ops/kernels/mesh_features.h"
+#include "ops/kernels/distance/leaf_distances.h"
+#include "ops/kernels/distance/mesh_features.h"
 #include "vdbdither/model/lattice.h"
 #include "vdbdither/model/mesh.h"
 #include "vdbdither/model/openvdb.h"

@@ -1,4 +1,4 @@
-#include "ops/kernels/zero_set_distance.h"
+#include "ops/kernels/distance/zero_set_distance.h"
 
 #include <algorithm>
 #include <cmath>

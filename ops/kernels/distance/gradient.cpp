@@ -1,4 +1,4 @@
-#include "ops/kernels/gradient.h"
+#include "ops/kernels/distance/gradient.h"
 
 #ifdef __SSE2__
 #include <emmintrin.h>

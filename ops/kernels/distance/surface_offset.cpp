@@ -1,4 +1,4 @@
-#include "ops/kernels/surface_offset.h"
+#include "ops/kernels/distance/surface_offset.h"
 
 #include <algorithm>
 #include <atomic>
@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/closest_surface_voxel.h"
-#include "ops/kernels/gradient.h"
+#include "ops/kernels/distance/closest_surface_voxel.h"
+#include "ops/kernels/distance/gradient.h"
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/surface_leaves.h"

@@ -6,7 +6,7 @@
 // scans, and ends as soon as the lateral distance alone exceeds the best: near the surface that is
 // after a handful of columns.
 
-#include "ops/kernels/closest_surface_voxel.h"
+#include "ops/kernels/distance/closest_surface_voxel.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "ops/kernels/surface_offset.h"
+#include "ops/kernels/distance/surface_offset.h"
 
 #include <cmath>
 

@@ -4,7 +4,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "ops/kernels/drain.h"
+#include "ops/kernels/distance/drain.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {

@@ -1,4 +1,4 @@
-#include "ops/kernels/hollow.h"
+#include "ops/kernels/distance/hollow.h"
 
 #include <cmath>
 #include <limits>

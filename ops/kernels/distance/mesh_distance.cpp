@@ -2,7 +2,7 @@
 // distances of a block's voxels where its region holds them; the sign comes from a sweep along x,
 // which needs nothing but the triangles that cross the layers at hand.
 
-#include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/distance/mesh_distance.h"
 
 #include <algorithm>
 #include <array>
@@ -18,8 +18,8 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/leaf_distances.h"
-#include "ops/kernels/row_crossings.h"
+#include "ops/kernels/distance/leaf_distances.h"
+#include "ops/kernels/distance/row_crossings.h"
 
 namespace vdbdither {
 

@@ -3,7 +3,7 @@
 #include <memory>
 #include <mutex>
 
-#include "ops/kernels/mesh_distance.h"
+#include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/zero_set.h"
 #include "vdbdither/model/lattice.h"
 

@@ -5,7 +5,7 @@
 // gives for any set of triangles, so they are right for open and non-manifold meshes too: a wedge
 // lies beyond every face of its edge, a cone beyond every edge of its vertex.
 
-#include "ops/kernels/mesh_features.h"
+#include "ops/kernels/distance/mesh_features.h"
 
 #include <algorithm>
 #include <cmath>
