@@ -6,10 +6,10 @@
 #include "io/data_files.h"
 #include "io/mask_cache.h"
 #include "io/vdb.h"
-#include "ops/kernels/mask_tile.h"
+#include "ops/kernels/mask/mask_tile.h"
 #include "ops/kernels/shape_dither.h"
 #include "ops/kernels/leaf/solid.h"
-#include "ops/kernels/threshold_mask.h"
+#include "ops/kernels/mask/threshold_mask.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/engine/operator.h"
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <mutex>
 
-#include "ops/kernels/gradient_noise.h"
-#include "ops/kernels/mask_tile.h"
+#include "ops/kernels/mask/gradient_noise.h"
+#include "ops/kernels/mask/mask_tile.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/engine/operator.h"
 

@@ -5,7 +5,7 @@
 #include <openvdb/openvdb.h>
 
 #include "ops/kernels/adapted_amplitude.h"
-#include "ops/kernels/threshold_mask.h"
+#include "ops/kernels/mask/threshold_mask.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {

@@ -2,7 +2,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "ops/kernels/void_and_cluster.h"
+#include "ops/kernels/mask/void_and_cluster.h"
 
 namespace vdbdither {
 namespace {

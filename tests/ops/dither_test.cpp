@@ -7,7 +7,7 @@
 #include <openvdb/tools/Prune.h>
 
 #include "io/vdb.h"
-#include "ops/kernels/threshold_mask.h"
+#include "ops/kernels/mask/threshold_mask.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/filters.h"
 #include "vdbdither/model/errors.h"

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
-#include "ops/kernels/void_and_cluster.h"
+#include "ops/kernels/mask/void_and_cluster.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/engine/registry.h"
 

@@ -1,4 +1,4 @@
-#include "ops/kernels/mask_tile.h"
+#include "ops/kernels/mask/mask_tile.h"
 
 #include "vdbdither/model/openvdb.h"
 

@@ -1,4 +1,4 @@
-#include "ops/kernels/threshold_mask.h"
+#include "ops/kernels/mask/threshold_mask.h"
 
 #include <bit>
 #include <cassert>

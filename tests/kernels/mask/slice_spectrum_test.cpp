@@ -1,4 +1,4 @@
-#include "ops/kernels/slice_spectrum.h"
+#include "ops/kernels/mask/slice_spectrum.h"
 
 #include <cmath>
 #include <complex>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ops/kernels/void_and_cluster.h"
+#include "ops/kernels/mask/void_and_cluster.h"
 
 namespace vdbdither {
 namespace {

@@ -1,11 +1,11 @@
-#include "ops/kernels/gradient_noise.h"
+#include "ops/kernels/mask/gradient_noise.h"
 
 #include <algorithm>
 #include <array>
 #include <numeric>
 #include <tuple>
 
-#include "ops/kernels/void_and_cluster.h"
+#include "ops/kernels/mask/void_and_cluster.h"
 
 namespace vdbdither {
 

@@ -4,7 +4,7 @@
 // from g(x, y, round(t)) with t = s·x + t·y + c: as round(t) - t has period 1 in t,
 // exp(2πi·f·round(t)) is the sum over m of sinc(f + m)·exp(2πi·(f + m)·t), and the mean over c
 // parts the terms.
-#include "ops/kernels/slice_spectrum.h"
+#include "ops/kernels/mask/slice_spectrum.h"
 
 #include <algorithm>
 #include <cmath>

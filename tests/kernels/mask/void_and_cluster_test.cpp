@@ -1,4 +1,4 @@
-#include "ops/kernels/void_and_cluster.h"
+#include "ops/kernels/mask/void_and_cluster.h"
 
 #include <algorithm>
 #include <cmath>

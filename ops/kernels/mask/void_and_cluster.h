@@ -6,7 +6,7 @@
 
 #include <openvdb/Types.h>
 
-#include "ops/kernels/mask_kernel.h"
+#include "ops/kernels/mask/mask_kernel.h"
 
 namespace vdbdither {
 

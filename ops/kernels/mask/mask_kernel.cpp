@@ -1,7 +1,7 @@
 // The Gaussian of void and cluster as Ulichney, "The void-and-cluster method for dither array
 // generation", SPIE 1913 (1993) samples it, and as Peters, "Free blue noise textures" (2016)
 // applies it on the DFT. Both are products of one factor per axis.
-#include "ops/kernels/mask_kernel.h"
+#include "ops/kernels/mask/mask_kernel.h"
 
 #include <cmath>
 

@@ -7,7 +7,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "ops/kernels/void_and_cluster.h"
+#include "ops/kernels/mask/void_and_cluster.h"
 
 namespace vdbdither {
 

@@ -7,7 +7,7 @@
 // stored in bricks of one line, the kernel is cut into the same bricks once for every position of
 // its centre in a brick, and the extremum is found through lower bounds that are looked at again
 // only when they are the least.
-#include "ops/kernels/void_and_cluster.h"
+#include "ops/kernels/mask/void_and_cluster.h"
 
 #include <algorithm>
 #include <array>
