@@ -7,7 +7,7 @@
 #include "io/mask_cache.h"
 #include "io/vdb.h"
 #include "ops/kernels/mask/mask_tile.h"
-#include "ops/kernels/shape_dither.h"
+#include "ops/kernels/dither/shape_dither.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/mask/threshold_mask.h"
 #include "vdbdither/model/find_grid.h"

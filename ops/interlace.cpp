@@ -1,4 +1,4 @@
-#include "ops/kernels/interlace.h"
+#include "ops/kernels/dither/interlace.h"
 
 #include <cmath>
 

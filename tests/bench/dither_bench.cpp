@@ -8,8 +8,8 @@
 
 #include "ops/kernels/distance/closest_surface_voxel.h"
 #include "ops/kernels/distance/gradient.h"
-#include "ops/kernels/interlace.h"
-#include "ops/kernels/shape_dither.h"
+#include "ops/kernels/dither/interlace.h"
+#include "ops/kernels/dither/shape_dither.h"
 
 namespace vdbdither {
 namespace {

@@ -17,8 +17,8 @@
 #include <random>
 
 #include "io/vdb.h"
-#include "ops/kernels/shape_dither.h"
-#include "ops/kernels/voxel_diameter.h"
+#include "ops/kernels/dither/shape_dither.h"
+#include "ops/kernels/dither/voxel_diameter.h"
 #include "tests/support/volumes.h"
 #include "vdbdither/engine/options.h"
 

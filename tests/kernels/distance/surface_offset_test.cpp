@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "ops/kernels/leaf/held_band.h"
-#include "ops/kernels/shape_dither.h"
+#include "ops/kernels/dither/shape_dither.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/volumes.h"
 #include "vdbdither/model/errors.h"

@@ -1,4 +1,4 @@
-#include "ops/kernels/wall_guard.h"
+#include "ops/kernels/dither/wall_guard.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "ops/kernels/shape_dither.h"
+#include "ops/kernels/dither/shape_dither.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 #include "ops/kernels/distance/gradient.h"
 #include "ops/kernels/distance/mesh_distance.h"
-#include "ops/kernels/voxel_diameter.h"
+#include "ops/kernels/dither/voxel_diameter.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/shapes.h"
 

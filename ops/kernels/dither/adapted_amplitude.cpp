@@ -1,4 +1,4 @@
-#include "ops/kernels/adapted_amplitude.h"
+#include "ops/kernels/dither/adapted_amplitude.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/voxel_diameter.h"
+#include "ops/kernels/dither/voxel_diameter.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "ops/kernels/adapted_amplitude.h"
+#include "ops/kernels/dither/adapted_amplitude.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,7 +1,7 @@
 // Eqs. (1)–(7) of Morsy, Brunton, Urban: Shape Dithering for 3D Printing, ACM Transactions on
 // Graphics 41(4), 2022.
 
-#include "ops/kernels/shape_dither.h"
+#include "ops/kernels/dither/shape_dither.h"
 
 #include <algorithm>
 #include <array>
@@ -14,8 +14,8 @@
 #include "ops/kernels/distance/gradient.h"
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
-#include "ops/kernels/voxel_diameter.h"
-#include "ops/kernels/wall_guard.h"
+#include "ops/kernels/dither/voxel_diameter.h"
+#include "ops/kernels/dither/wall_guard.h"
 
 namespace vdbdither {
 

@@ -4,7 +4,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "ops/kernels/adapted_amplitude.h"
+#include "ops/kernels/dither/adapted_amplitude.h"
 #include "ops/kernels/mask/threshold_mask.h"
 #include "vdbdither/model/lattice.h"
 
