@@ -14,7 +14,7 @@
 #include "ops/kernels/mesh/closest_point.h"
 #include "ops/kernels/diverging_colours.h"
 #include "ops/kernels/facet_roughness.h"
-#include "ops/kernels/grid_surface.h"
+#include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/mesh_repair.h"
 #include "ops/kernels/surface_error.h"

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "io/mesh_writer.h"
-#include "ops/kernels/grid_surface.h"
+#include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/mesh/taubin.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"

@@ -4,7 +4,7 @@
 #include <mutex>
 
 #include "ops/kernels/distance/mesh_distance.h"
-#include "ops/kernels/zero_set.h"
+#include "ops/kernels/contour/zero_set.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {

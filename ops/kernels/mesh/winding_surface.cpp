@@ -25,7 +25,7 @@
 #include <tbb/parallel_sort.h>
 
 #include "ops/kernels/mesh/grid_keys.h"
-#include "ops/kernels/marching_cubes.h"
+#include "ops/kernels/contour/marching_cubes.h"
 #include "ops/kernels/surface_error.h"
 #include "ops/kernels/mesh/triangle_and_cube.h"
 #include "ops/kernels/mesh/winding_cells.h"

@@ -1,4 +1,4 @@
-#include "ops/kernels/marching_cubes.h"
+#include "ops/kernels/contour/marching_cubes.h"
 
 #include <limits>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include "ops/kernels/iso_surface.h"
+#include "ops/kernels/contour/iso_surface.h"
 
 #include <cmath>
 #include <numbers>
@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "ops/kernels/marching_cubes.h"
+#include "ops/kernels/contour/marching_cubes.h"
 #include "ops/kernels/normal_distribution.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/mesh_checks.h"

@@ -1,4 +1,4 @@
-#include "ops/kernels/voxel_faces.h"
+#include "ops/kernels/contour/voxel_faces.h"
 
 #include <array>
 #include <bit>

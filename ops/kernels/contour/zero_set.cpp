@@ -1,4 +1,4 @@
-#include "ops/kernels/zero_set.h"
+#include "ops/kernels/contour/zero_set.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "ops/kernels/iso_surface.h"
+#include "ops/kernels/contour/iso_surface.h"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/marching_cubes.h"
+#include "ops/kernels/contour/marching_cubes.h"
 #include "ops/kernels/normal_distribution.h"
 #include "vdbdither/model/errors.h"
 

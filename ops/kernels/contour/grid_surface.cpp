@@ -1,4 +1,4 @@
-#include "ops/kernels/grid_surface.h"
+#include "ops/kernels/contour/grid_surface.h"
 
 #include <algorithm>
 #include <array>

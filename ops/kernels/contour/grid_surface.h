@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ops/kernels/iso_surface.h"
+#include "ops/kernels/contour/iso_surface.h"
 #include "vdbdither/model/grid.h"
 
 namespace vdbdither {

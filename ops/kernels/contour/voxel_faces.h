@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "ops/kernels/leaf/bit_layers.h"
-#include "ops/kernels/iso_surface.h"
+#include "ops/kernels/contour/iso_surface.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
