@@ -8,7 +8,7 @@
 
 #include "io/material_table.h"
 #include "io/printer_profile.h"
-#include "ops/kernels/depth_bands.h"
+#include "ops/kernels/printing/depth_bands.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"

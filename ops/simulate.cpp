@@ -3,7 +3,7 @@
 #include <string>
 
 #include "io/printer_profile.h"
-#include "ops/kernels/gaussian_spread.h"
+#include "ops/kernels/printing/gaussian_spread.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"

@@ -11,7 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/contour/marching_cubes.h"
-#include "ops/kernels/normal_distribution.h"
+#include "ops/kernels/printing/normal_distribution.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

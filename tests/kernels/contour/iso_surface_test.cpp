@@ -8,7 +8,7 @@
 #include <tbb/global_control.h>
 
 #include "ops/kernels/contour/marching_cubes.h"
-#include "ops/kernels/normal_distribution.h"
+#include "ops/kernels/printing/normal_distribution.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/volumes.h"

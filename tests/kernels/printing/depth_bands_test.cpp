@@ -1,4 +1,4 @@
-#include "ops/kernels/depth_bands.h"
+#include "ops/kernels/printing/depth_bands.h"
 
 #include <cmath>
 #include <random>

@@ -1,4 +1,4 @@
-#include "ops/kernels/gaussian_spread.h"
+#include "ops/kernels/printing/gaussian_spread.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include "ops/kernels/leaf/bit_layers.h"
 #include "ops/kernels/leaf/leaf_bits.h"
-#include "ops/kernels/normal_distribution.h"
+#include "ops/kernels/printing/normal_distribution.h"
 
 namespace vdbdither {
 

@@ -1,11 +1,11 @@
-#include "ops/kernels/gaussian_spread.h"
+#include "ops/kernels/printing/gaussian_spread.h"
 
 #include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "ops/kernels/normal_distribution.h"
+#include "ops/kernels/printing/normal_distribution.h"
 #include "tests/support/volumes.h"
 
 namespace vdbdither {

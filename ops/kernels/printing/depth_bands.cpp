@@ -5,7 +5,7 @@
 // of a block and ends as soon as no step further can change what comes of it: along x, that is
 // where every voxel of the plane is known to lie in the outermost band.
 
-#include "ops/kernels/depth_bands.h"
+#include "ops/kernels/printing/depth_bands.h"
 
 #include <algorithm>
 #include <array>

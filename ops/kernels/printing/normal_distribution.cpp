@@ -1,4 +1,4 @@
-#include "ops/kernels/normal_distribution.h"
+#include "ops/kernels/printing/normal_distribution.h"
 
 #include <algorithm>
 #include <cmath>
