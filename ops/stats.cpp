@@ -6,8 +6,8 @@
 
 #include "io/material_table.h"
 #include "io/slice_runs.h"
-#include "ops/kernels/histogram.h"
-#include "ops/kernels/surface_area.h"
+#include "ops/kernels/measure/histogram.h"
+#include "ops/kernels/measure/surface_area.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/operator.h"

@@ -26,7 +26,7 @@
 
 #include "ops/kernels/mesh/grid_keys.h"
 #include "ops/kernels/contour/marching_cubes.h"
-#include "ops/kernels/surface_error.h"
+#include "ops/kernels/measure/surface_error.h"
 #include "ops/kernels/mesh/triangle_and_cube.h"
 #include "ops/kernels/mesh/winding_cells.h"
 #include "vdbdither/model/openvdb.h"

@@ -1,4 +1,4 @@
-#include "ops/kernels/surface_error.h"
+#include "ops/kernels/measure/surface_error.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "ops/kernels/grid_difference.h"
+#include "ops/kernels/measure/grid_difference.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <array>
 #include <optional>
 
-#include "ops/kernels/surface_error.h"
+#include "ops/kernels/measure/surface_error.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {

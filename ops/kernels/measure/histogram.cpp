@@ -1,4 +1,4 @@
-#include "ops/kernels/histogram.h"
+#include "ops/kernels/measure/histogram.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "ops/kernels/axis_errors.h"
+#include "ops/kernels/measure/axis_errors.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "ops/kernels/facet_roughness.h"
+#include "ops/kernels/measure/facet_roughness.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,11 +1,11 @@
-#include "ops/kernels/surface_error.h"
+#include "ops/kernels/measure/surface_error.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "ops/kernels/axis_errors.h"
+#include "ops/kernels/measure/axis_errors.h"
 #include "tests/support/shapes.h"
 
 namespace vdbdither {

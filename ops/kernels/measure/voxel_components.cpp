@@ -1,4 +1,4 @@
-#include "ops/kernels/voxel_components.h"
+#include "ops/kernels/measure/voxel_components.h"
 
 #include <algorithm>
 #include <bit>

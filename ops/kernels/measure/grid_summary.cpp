@@ -1,4 +1,4 @@
-#include "ops/kernels/grid_summary.h"
+#include "ops/kernels/measure/grid_summary.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>

@@ -1,4 +1,4 @@
-#include "ops/kernels/surface_area.h"
+#include "ops/kernels/measure/surface_area.h"
 
 #include <cmath>
 #include <numbers>

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "ops/kernels/mesh/closest_point.h"
-#include "ops/kernels/surface_error.h"
+#include "ops/kernels/measure/surface_error.h"
 
 namespace vdbdither {
 
