@@ -14,7 +14,7 @@
 #include "io/png_runs.h"
 #include "io/staged_output.h"
 #include "io/standard_streams.h"
-#include "ops/kernels/picture_similarity.h"
+#include "ops/kernels/picture/picture_similarity.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

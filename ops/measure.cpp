@@ -12,7 +12,7 @@
 #include "io/staged_output.h"
 #include "ops/kernels/measure/axis_errors.h"
 #include "ops/kernels/mesh/closest_point.h"
-#include "ops/kernels/diverging_colours.h"
+#include "ops/kernels/picture/diverging_colours.h"
 #include "ops/kernels/measure/facet_roughness.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/mesh/mesh_placement.h"

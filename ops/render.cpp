@@ -12,7 +12,7 @@
 #include "io/png_runs.h"
 #include "io/staged_output.h"
 #include "ops/kernels/contour/grid_surface.h"
-#include "ops/kernels/ray_picture.h"
+#include "ops/kernels/picture/ray_picture.h"
 #include "ops/kernels/contour/voxel_faces.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"

@@ -1,4 +1,4 @@
-#include "ops/kernels/picture_similarity.h"
+#include "ops/kernels/picture/picture_similarity.h"
 
 #include <algorithm>
 #include <cmath>

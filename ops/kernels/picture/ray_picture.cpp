@@ -1,4 +1,4 @@
-#include "ops/kernels/ray_picture.h"
+#include "ops/kernels/picture/ray_picture.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "ops/kernels/plane.h"
+#include "ops/kernels/picture/plane.h"
 
 namespace vdbdither {
 
