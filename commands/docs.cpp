@@ -2,7 +2,7 @@
 
 #include "commands/command.h"
 #include "commands/manual.h"
-#include "io/staged_output.h"
+#include "io/file/staged_output.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

@@ -6,7 +6,7 @@
 
 #include "commands/command.h"
 #include "io/printer_profile.h"
-#include "io/standard_streams.h"
+#include "io/file/standard_streams.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

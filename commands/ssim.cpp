@@ -12,8 +12,8 @@
 #include "commands/command.h"
 #include "io/picture.h"
 #include "io/png_runs.h"
-#include "io/staged_output.h"
-#include "io/standard_streams.h"
+#include "io/file/staged_output.h"
+#include "io/file/standard_streams.h"
 #include "ops/kernels/picture/picture_similarity.h"
 #include "vdbdither/model/errors.h"
 

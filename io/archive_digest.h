@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "io/digest.h"
+#include "io/file/digest.h"
 #include "io/vdb.h"
 
 namespace vdbdither {

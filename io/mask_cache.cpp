@@ -3,8 +3,8 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "io/digest.h"
-#include "io/staged_output.h"
+#include "io/file/digest.h"
+#include "io/file/staged_output.h"
 #include "io/vdb.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"

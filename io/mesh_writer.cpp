@@ -12,7 +12,7 @@
 #include <unistd.h>
 #include <utility>
 
-#include "io/staged_output.h"
+#include "io/file/staged_output.h"
 #include "io/text_cursor.h"
 #include "vdbdither/model/errors.h"
 

@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/data_files.h"
+#include "io/file/data_files.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/engine/options.h"
 

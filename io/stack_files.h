@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "io/staged_output.h"
+#include "io/file/staged_output.h"
 #include "io/zip.h"
 
 namespace vdbdither {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "io/data_files.h"
+#include "io/file/data_files.h"
 #include "io/mask_cache.h"
 #include "io/vdb.h"
 #include "ops/kernels/mask/mask_tile.h"

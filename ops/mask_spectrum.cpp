@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/staged_output.h"
+#include "io/file/staged_output.h"
 #include "ops/kernels/mask/slice_spectrum.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"

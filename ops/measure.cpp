@@ -9,7 +9,7 @@
 
 #include "io/mesh_reader.h"
 #include "io/mesh_writer.h"
-#include "io/staged_output.h"
+#include "io/file/staged_output.h"
 #include "ops/kernels/measure/axis_errors.h"
 #include "ops/kernels/mesh/closest_point.h"
 #include "ops/kernels/picture/diverging_colours.h"

@@ -10,7 +10,7 @@
 #include "io/mesh_reader.h"
 #include "io/picture.h"
 #include "io/png_runs.h"
-#include "io/staged_output.h"
+#include "io/file/staged_output.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/picture/ray_picture.h"
 #include "ops/kernels/contour/voxel_faces.h"

@@ -9,7 +9,7 @@
 #include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
 
-#include "io/digest.h"
+#include "io/file/digest.h"
 #include "io/exr.h"
 #include "io/material_table.h"
 #include "io/png_runs.h"

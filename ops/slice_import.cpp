@@ -7,7 +7,7 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/parallel_for.h>
 
-#include "io/digest.h"
+#include "io/file/digest.h"
 #include "io/exr.h"
 #include "io/material_table.h"
 #include "io/png_decoder.h"

@@ -8,8 +8,8 @@
 #include <openvdb/tools/Prune.h>
 
 #include "io/frames.h"
-#include "io/staged_output.h"
-#include "io/standard_streams.h"
+#include "io/file/staged_output.h"
+#include "io/file/standard_streams.h"
 #include "io/vdb.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 #include <spng.h>
 
-#include "io/staged_output.h"
+#include "io/file/staged_output.h"
 #include "tests/support/png_reader.h"
 #include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/staged_output.h"
+#include "io/file/staged_output.h"
 #include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 
-#include "io/digest.h"
+#include "io/file/digest.h"
 #include "io/material_table.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/png_reader.h"

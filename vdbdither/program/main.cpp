@@ -10,7 +10,7 @@
 
 #include "commands/command.h"
 #include "commands/manual.h"
-#include "io/standard_streams.h"
+#include "io/file/standard_streams.h"
 #include "io/vdb.h"
 #include "vdbdither/engine/chain.h"
 #include "vdbdither/program/console.h"

@@ -1,4 +1,4 @@
-#include "io/standard_streams.h"
+#include "io/file/standard_streams.h"
 
 #include <cerrno>
 #include <cstring>

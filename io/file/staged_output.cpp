@@ -1,4 +1,4 @@
-#include "io/staged_output.h"
+#include "io/file/staged_output.h"
 
 #include <cerrno>
 #include <charconv>

@@ -1,4 +1,4 @@
-#include "io/data_files.h"
+#include "io/file/data_files.h"
 
 #include <cstdlib>
 

@@ -1,4 +1,4 @@
-#include "io/digest.h"
+#include "io/file/digest.h"
 
 #include <new>
 
