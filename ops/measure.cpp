@@ -7,8 +7,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/mesh_reader.h"
-#include "io/mesh_writer.h"
+#include "io/mesh/mesh_reader.h"
+#include "io/mesh/mesh_writer.h"
 #include "io/file/staged_output.h"
 #include "ops/kernels/measure/axis_errors.h"
 #include "ops/kernels/mesh/closest_point.h"

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/mesh_reader.h"
+#include "io/mesh/mesh_reader.h"
 #include "io/printer_profile.h"
 #include "io/target_lattice.h"
 #include "ops/kernels/leaf/held_band.h"

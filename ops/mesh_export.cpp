@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "io/mesh_writer.h"
+#include "io/mesh/mesh_writer.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/mesh/taubin.h"
 #include "vdbdither/model/errors.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "io/exr.h"
-#include "io/mesh_reader.h"
+#include "io/mesh/mesh_reader.h"
 #include "io/picture.h"
 #include "io/png_runs.h"
 #include "io/file/staged_output.h"

@@ -13,7 +13,7 @@
 #include <openvdb/tools/MeshToVolume.h>
 #include <tbb/global_control.h>
 
-#include "io/mesh_reader.h"
+#include "io/mesh/mesh_reader.h"
 #include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/mesh/mesh_repair.h"
 

@@ -6,7 +6,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "io/mesh_reader.h"
+#include "io/mesh/mesh_reader.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/shapes.h"
 

@@ -11,7 +11,7 @@
 
 #include <tbb/parallel_reduce.h>
 
-#include "io/mesh_reader.h"
+#include "io/mesh/mesh_reader.h"
 #include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/mesh/mesh_repair.h"
 #include "ops/kernels/mesh/swallowed_walls.h"

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "io/mesh_formats.h"
+#include "io/mesh/mesh_formats.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/mesh_reader.h"
+#include "io/mesh/mesh_reader.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/filters.h"
 #include "tests/support/mesh_files.h"

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/mesh_reader.h"
+#include "io/mesh/mesh_reader.h"
 #include "ops/kernels/mesh/mesh_repair.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/filters.h"

@@ -6,8 +6,8 @@
 #include <cstring>
 #include <limits>
 
-#include "io/mesh_formats.h"
-#include "io/text_cursor.h"
+#include "io/mesh/mesh_formats.h"
+#include "io/mesh/text_cursor.h"
 
 namespace vdbdither {
 

@@ -2,7 +2,7 @@
 // Monthly 82(6), 1975; quadratic as in H. ElGindy, H. Everett, G. Toussaint, "Slicing an Ear Using
 // Prune-and-Search", Pattern Recognition Letters 14(9), 1993.
 
-#include "io/polygon.h"
+#include "io/mesh/polygon.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "io/mesh_writer.h"
+#include "io/mesh/mesh_writer.h"
 
 #include <fstream>
 #include <sstream>
@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/mesh_reader.h"
+#include "io/mesh/mesh_reader.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/model/errors.h"

@@ -1,4 +1,4 @@
-#include "io/mesh_reader.h"
+#include "io/mesh/mesh_reader.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,8 +14,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/mesh_formats.h"
-#include "io/polygon.h"
+#include "io/mesh/mesh_formats.h"
+#include "io/mesh/polygon.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/model/errors.h"

@@ -1,4 +1,4 @@
-#include "io/mesh_writer.h"
+#include "io/mesh/mesh_writer.h"
 
 #include <algorithm>
 #include <bit>
@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "io/file/staged_output.h"
-#include "io/text_cursor.h"
+#include "io/mesh/text_cursor.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

@@ -1,4 +1,4 @@
-#include "io/text_cursor.h"
+#include "io/mesh/text_cursor.h"
 
 #include <array>
 #include <cmath>

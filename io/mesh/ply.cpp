@@ -10,9 +10,9 @@
 #include <string>
 #include <type_traits>
 
-#include "io/mesh_formats.h"
-#include "io/polygon.h"
-#include "io/text_cursor.h"
+#include "io/mesh/mesh_formats.h"
+#include "io/mesh/polygon.h"
+#include "io/mesh/text_cursor.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "io/mesh_reader.h"
+#include "io/mesh/mesh_reader.h"
 
 #include <algorithm>
 #include <array>
@@ -12,8 +12,8 @@
 #include <system_error>
 #include <unistd.h>
 
-#include "io/mesh_formats.h"
-#include "io/text_cursor.h"
+#include "io/mesh/mesh_formats.h"
+#include "io/mesh/text_cursor.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

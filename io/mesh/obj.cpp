@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <string>
 
-#include "io/mesh_formats.h"
-#include "io/polygon.h"
-#include "io/text_cursor.h"
+#include "io/mesh/mesh_formats.h"
+#include "io/mesh/polygon.h"
+#include "io/mesh/text_cursor.h"
 
 namespace vdbdither {
 
