@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/slab_reader.h"
+#include "io/vdb/slab_reader.h"
 #include "ops/kernels/measure/grid_difference.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"

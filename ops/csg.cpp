@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "io/slab_reader.h"
+#include "io/vdb/slab_reader.h"
 #include "ops/kernels/leaf/part_index.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"

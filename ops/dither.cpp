@@ -4,8 +4,8 @@
 #include <filesystem>
 
 #include "io/file/data_files.h"
-#include "io/mask_cache.h"
-#include "io/vdb.h"
+#include "io/vdb/mask_cache.h"
+#include "io/vdb/vdb.h"
 #include "ops/kernels/mask/mask_tile.h"
 #include "ops/kernels/dither/shape_dither.h"
 #include "ops/kernels/leaf/solid.h"

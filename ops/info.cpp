@@ -8,7 +8,7 @@
 
 #include "io/material_table.h"
 #include "io/printer_profile.h"
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "ops/kernels/measure/grid_summary.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"

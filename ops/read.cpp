@@ -1,6 +1,6 @@
 #include <unistd.h>
 
-#include "io/slab_reader.h"
+#include "io/vdb/slab_reader.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"

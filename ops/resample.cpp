@@ -5,9 +5,9 @@
 
 #include <tbb/parallel_reduce.h>
 
-#include "io/frames.h"
+#include "io/vdb/frames.h"
 #include "io/target_lattice.h"
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/distance/zero_set_distance.h"

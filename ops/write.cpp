@@ -7,10 +7,10 @@
 
 #include <openvdb/tools/Prune.h>
 
-#include "io/frames.h"
+#include "io/vdb/frames.h"
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"

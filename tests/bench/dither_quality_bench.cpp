@@ -16,7 +16,7 @@
 #include <numbers>
 #include <random>
 
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "ops/kernels/dither/shape_dither.h"
 #include "ops/kernels/dither/voxel_diameter.h"
 #include "tests/support/volumes.h"

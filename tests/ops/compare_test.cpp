@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/sinks.h"

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"

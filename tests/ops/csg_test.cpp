@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "ops/kernels/leaf/part_index.h"
 #include "tests/support/filters.h"
 #include "tests/support/scratch_folder.h"

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/tools/Prune.h>
 
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "ops/kernels/mask/threshold_mask.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/filters.h"

@@ -6,7 +6,7 @@
 #include <openvdb/points/PointDataGrid.h>
 
 #include "io/material_table.h"
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/sinks.h"

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/volumes.h"
 #include "vdbdither/model/errors.h"

@@ -9,7 +9,7 @@
 #include "io/material_table.h"
 #include "io/png_runs.h"
 #include "io/file/staged_output.h"
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"

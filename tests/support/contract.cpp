@@ -1,6 +1,6 @@
 #include "tests/support/contract.h"
 
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/window.h"

@@ -11,7 +11,7 @@
 #include "commands/command.h"
 #include "commands/manual.h"
 #include "io/file/standard_streams.h"
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "vdbdither/engine/chain.h"
 #include "vdbdither/program/console.h"
 #include "vdbdither/model/errors.h"

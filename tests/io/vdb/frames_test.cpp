@@ -1,4 +1,4 @@
-#include "io/frames.h"
+#include "io/vdb/frames.h"
 
 #include <csignal>
 #include <random>

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/frames.h"
+#include "io/vdb/frames.h"
 #include "vdbdither/model/slab.h"
 
 namespace vdbdither {

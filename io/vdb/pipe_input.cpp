@@ -1,4 +1,4 @@
-#include "io/pipe_input.h"
+#include "io/vdb/pipe_input.h"
 
 #include <cerrno>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 
 #include <filesystem>
 #include <fstream>

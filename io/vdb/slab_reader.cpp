@@ -1,4 +1,4 @@
-#include "io/slab_reader.h"
+#include "io/vdb/slab_reader.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -6,8 +6,8 @@
 #include <sstream>
 #include <unistd.h>
 
-#include "io/pipe_input.h"
-#include "io/vdb.h"
+#include "io/vdb/pipe_input.h"
+#include "io/vdb/vdb.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"

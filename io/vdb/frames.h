@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "vdbdither/model/slab.h"
 
 namespace vdbdither {

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "io/file/digest.h"
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 
 namespace vdbdither {
 

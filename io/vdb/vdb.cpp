@@ -1,4 +1,4 @@
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 #include <openvdb/io/Stream.h>
 #include <openvdb/tools/ChangeBackground.h>
 
-#include "io/archive_digest.h"
+#include "io/vdb/archive_digest.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/options.h"

@@ -1,11 +1,11 @@
-#include "io/mask_cache.h"
+#include "io/vdb/mask_cache.h"
 
 #include <cstdlib>
 #include <sstream>
 
 #include "io/file/digest.h"
 #include "io/file/staged_output.h"
-#include "io/vdb.h"
+#include "io/vdb/vdb.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
 

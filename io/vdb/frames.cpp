@@ -1,4 +1,4 @@
-#include "io/frames.h"
+#include "io/vdb/frames.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -9,8 +9,8 @@
 #include <unistd.h>
 #include <vector>
 
-#include "io/archive_digest.h"
-#include "io/pipe_input.h"
+#include "io/vdb/archive_digest.h"
+#include "io/vdb/pipe_input.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
 #include "vdbdither/model/layers.h"
