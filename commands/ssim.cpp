@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "commands/command.h"
-#include "io/picture.h"
-#include "io/png_runs.h"
+#include "io/image/picture.h"
+#include "io/image/png_runs.h"
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
 #include "ops/kernels/picture/picture_similarity.h"

@@ -9,7 +9,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "io/png_runs.h"
+#include "io/image/png_runs.h"
 
 namespace vdbdither {
 

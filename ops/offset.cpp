@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "io/grey_image.h"
+#include "io/image/grey_image.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/leaf/surface_leaves.h"
 #include "ops/kernels/distance/surface_offset.h"

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "io/exr.h"
+#include "io/image/exr.h"
 #include "io/mesh/mesh_reader.h"
-#include "io/picture.h"
-#include "io/png_runs.h"
+#include "io/image/picture.h"
+#include "io/image/png_runs.h"
 #include "io/file/staged_output.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/picture/ray_picture.h"

@@ -10,13 +10,13 @@
 #include <tbb/task_arena.h>
 
 #include "io/file/digest.h"
-#include "io/exr.h"
+#include "io/image/exr.h"
 #include "io/material_table.h"
-#include "io/png_runs.h"
+#include "io/image/png_runs.h"
 #include "io/slice_runs.h"
 #include "io/stack_files.h"
 #include "io/stack_preview.h"
-#include "io/tiff.h"
+#include "io/image/tiff.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/openvdb.h"

@@ -10,7 +10,7 @@
 #include <png.h>
 #include <spng.h>
 
-#include "io/png_runs.h"
+#include "io/image/png_runs.h"
 #include "tests/support/run_images.h"
 
 namespace vdbdither {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/exr.h"
+#include "io/image/exr.h"
 #include "tests/support/contract.h"
 #include "tests/support/filters.h"
 #include "tests/support/scratch_folder.h"

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/picture.h"
+#include "io/image/picture.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/filters.h"
 #include "tests/support/mesh_files.h"

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/material_table.h"
-#include "io/png_runs.h"
+#include "io/image/png_runs.h"
 #include "io/file/staged_output.h"
 #include "io/vdb/vdb.h"
 #include "tests/support/drawn_grids.h"

@@ -2,7 +2,7 @@
 // minimum-redundancy codes", WADS 1995, cut to the greatest length by shifting weight between the
 // lengths.
 
-#include "io/deflate_writer.h"
+#include "io/image/deflate_writer.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "io/png_runs.h"
+#include "io/image/png_runs.h"
 
 #include <cmath>
 #include <cstdlib>

@@ -1,11 +1,11 @@
-#include "io/picture.h"
+#include "io/image/picture.h"
 
 #include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/png_runs.h"
+#include "io/image/png_runs.h"
 #include "io/file/staged_output.h"
 #include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"

@@ -1,11 +1,11 @@
-#include "io/tiff.h"
+#include "io/image/tiff.h"
 
 #include <tiffio.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/png_runs.h"
+#include "io/image/png_runs.h"
 #include "io/file/staged_output.h"
 #include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"

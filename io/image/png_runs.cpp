@@ -4,7 +4,7 @@
 // what starts a run otherwise is looked up among the runs before it, by the next six, three and one
 // of them.
 
-#include "io/png_runs.h"
+#include "io/image/png_runs.h"
 
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 #include <string_view>
 #include <zlib.h>
 
-#include "io/deflate_writer.h"
+#include "io/image/deflate_writer.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

@@ -1,4 +1,4 @@
-#include "io/png_decoder.h"
+#include "io/image/png_decoder.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "io/grey_image.h"
+#include "io/image/grey_image.h"
 
 #include <cmath>
 #include <fstream>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <png.h>
 
-#include "io/exr.h"
+#include "io/image/exr.h"
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"
 

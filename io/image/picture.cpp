@@ -1,4 +1,4 @@
-#include "io/picture.h"
+#include "io/image/picture.h"
 
 #include <fstream>
 #include <iterator>
@@ -6,7 +6,7 @@
 
 #include <png.h>
 
-#include "io/png_decoder.h"
+#include "io/image/png_decoder.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

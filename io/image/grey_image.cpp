@@ -1,4 +1,4 @@
-#include "io/grey_image.h"
+#include "io/image/grey_image.h"
 
 #include <array>
 #include <cmath>

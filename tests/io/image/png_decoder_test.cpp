@@ -1,9 +1,9 @@
-#include "io/png_decoder.h"
+#include "io/image/png_decoder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/png_runs.h"
+#include "io/image/png_runs.h"
 #include "tests/support/run_images.h"
 #include "vdbdither/model/errors.h"
 

@@ -1,4 +1,4 @@
-#include "io/tiff.h"
+#include "io/image/tiff.h"
 
 #include <algorithm>
 #include <array>
