@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/material_table.h"
-#include "io/slice_runs.h"
+#include "io/stack/slice_runs.h"
 #include "ops/kernels/measure/histogram.h"
 #include "ops/kernels/measure/surface_area.h"
 #include "vdbdither/model/find_grid.h"

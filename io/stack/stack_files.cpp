@@ -1,4 +1,4 @@
-#include "io/stack_files.h"
+#include "io/stack/stack_files.h"
 
 #include <cerrno>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "io/zip.h"
+#include "io/stack/zip.h"
 
 #include <array>
 #include <cerrno>

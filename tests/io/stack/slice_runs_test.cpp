@@ -1,4 +1,4 @@
-#include "io/slice_runs.h"
+#include "io/stack/slice_runs.h"
 
 #include <random>
 

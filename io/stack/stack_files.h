@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "io/file/staged_output.h"
-#include "io/zip.h"
+#include "io/stack/zip.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "io/stack_preview.h"
+#include "io/stack/stack_preview.h"
 
 #include <algorithm>
 #include <array>
