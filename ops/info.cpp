@@ -6,8 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/material_table.h"
-#include "io/printer_profile.h"
+#include "io/profile/material_table.h"
+#include "io/profile/printer_profile.h"
 #include "io/vdb/vdb.h"
 #include "ops/kernels/measure/grid_summary.h"
 #include "vdbdither/model/errors.h"

@@ -6,8 +6,8 @@
 #include <openvdb/tree/LeafManager.h>
 #include <openvdb/tree/NodeManager.h>
 
-#include "io/material_table.h"
-#include "io/printer_profile.h"
+#include "io/profile/material_table.h"
+#include "io/profile/printer_profile.h"
 #include "ops/kernels/printing/depth_bands.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"

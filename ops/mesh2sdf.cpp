@@ -2,8 +2,8 @@
 #include <cmath>
 
 #include "io/mesh/mesh_reader.h"
-#include "io/printer_profile.h"
-#include "io/target_lattice.h"
+#include "io/profile/printer_profile.h"
+#include "io/profile/target_lattice.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/mesh/mesh_placement.h"

@@ -6,7 +6,7 @@
 #include <tbb/parallel_reduce.h>
 
 #include "io/vdb/frames.h"
-#include "io/target_lattice.h"
+#include "io/profile/target_lattice.h"
 #include "io/vdb/vdb.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/mesh/mesh_placement.h"

@@ -2,7 +2,7 @@
 #include <optional>
 #include <string>
 
-#include "io/printer_profile.h"
+#include "io/profile/printer_profile.h"
 #include "ops/kernels/printing/gaussian_spread.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"

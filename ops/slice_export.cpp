@@ -11,7 +11,7 @@
 
 #include "io/file/digest.h"
 #include "io/image/exr.h"
-#include "io/material_table.h"
+#include "io/profile/material_table.h"
 #include "io/image/png_runs.h"
 #include "io/stack/slice_runs.h"
 #include "io/stack/stack_files.h"

@@ -9,7 +9,7 @@
 
 #include "io/file/digest.h"
 #include "io/image/exr.h"
-#include "io/material_table.h"
+#include "io/profile/material_table.h"
 #include "io/image/png_decoder.h"
 #include "io/image/png_runs.h"
 #include "io/stack/slice_runs.h"

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/material_table.h"
+#include "io/profile/material_table.h"
 #include "io/stack/slice_runs.h"
 #include "ops/kernels/measure/histogram.h"
 #include "ops/kernels/measure/surface_area.h"

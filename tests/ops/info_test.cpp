@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <openvdb/points/PointDataGrid.h>
 
-#include "io/material_table.h"
+#include "io/profile/material_table.h"
 #include "io/vdb/vdb.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/scratch_folder.h"

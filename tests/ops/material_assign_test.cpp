@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/material_table.h"
-#include "io/printer_profile.h"
+#include "io/profile/material_table.h"
+#include "io/profile/printer_profile.h"
 #include "tests/support/drawn_grids.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/engine/operator.h"

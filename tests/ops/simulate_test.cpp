@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/printer_profile.h"
+#include "io/profile/printer_profile.h"
 #include "tests/support/filters.h"
 #include "vdbdither/model/errors.h"
 

@@ -11,7 +11,7 @@
 #include <tbb/global_control.h>
 
 #include "io/file/digest.h"
-#include "io/material_table.h"
+#include "io/profile/material_table.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/material_table.h"
+#include "io/profile/material_table.h"
 #include "io/image/png_runs.h"
 #include "io/file/staged_output.h"
 #include "io/vdb/vdb.h"

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/material_table.h"
+#include "io/profile/material_table.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/sinks.h"
 #include "tests/support/volumes.h"

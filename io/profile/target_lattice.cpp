@@ -1,9 +1,9 @@
-#include "io/target_lattice.h"
+#include "io/profile/target_lattice.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "io/printer_profile.h"
+#include "io/profile/printer_profile.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/engine/options.h"

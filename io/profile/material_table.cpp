@@ -1,6 +1,6 @@
 // Colours of the usual inks: the palette of the GrabCAD Voxel Print user guide.
 
-#include "io/material_table.h"
+#include "io/profile/material_table.h"
 
 #include <algorithm>
 #include <cctype>

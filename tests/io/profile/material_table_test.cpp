@@ -1,4 +1,4 @@
-#include "io/material_table.h"
+#include "io/profile/material_table.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

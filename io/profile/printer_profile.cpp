@@ -1,4 +1,4 @@
-#include "io/printer_profile.h"
+#include "io/profile/printer_profile.h"
 
 #include <algorithm>
 #include <filesystem>
