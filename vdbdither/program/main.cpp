@@ -8,8 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "commands/command.h"
-#include "commands/manual.h"
+#include "vdbdither/engine/command.h"
+#include "vdbdither/engine/manual.h"
 #include "io/file/standard_streams.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/chain.h"

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "commands/manual.h"
+#include "vdbdither/engine/manual.h"
 
 namespace vdbdither {
 

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "commands/command.h"
+#include "vdbdither/engine/command.h"
 #include "io/profile/printer_profile.h"
 #include "io/file/standard_streams.h"
 #include "vdbdither/model/errors.h"

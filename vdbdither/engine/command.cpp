@@ -1,4 +1,4 @@
-#include "commands/command.h"
+#include "vdbdither/engine/command.h"
 
 #include <array>
 

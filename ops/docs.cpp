@@ -1,7 +1,7 @@
 #include <filesystem>
 
-#include "commands/command.h"
-#include "commands/manual.h"
+#include "vdbdither/engine/command.h"
+#include "vdbdither/engine/manual.h"
 #include "io/file/staged_output.h"
 #include "vdbdither/model/errors.h"
 

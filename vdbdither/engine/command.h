@@ -18,7 +18,7 @@ class Command {
 };
 
 /// What the program holds of a command: `extern const CommandInfo printers` in
-/// commands/printers.cpp.
+/// ops/printers.cpp.
 struct CommandInfo {
   std::string_view name;
   std::string_view summary;  ///< one sentence, no full stop

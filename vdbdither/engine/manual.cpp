@@ -1,4 +1,4 @@
-#include "commands/manual.h"
+#include "vdbdither/engine/manual.h"
 
 #include <algorithm>
 #include <array>

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "commands/command.h"
+#include "vdbdither/engine/command.h"
 #include "vdbdither/engine/operator.h"
 
 namespace vdbdither {

@@ -9,7 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "commands/command.h"
+#include "vdbdither/engine/command.h"
 #include "io/image/picture.h"
 #include "io/image/png_runs.h"
 #include "io/file/staged_output.h"
