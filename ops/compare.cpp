@@ -7,10 +7,10 @@
 #include "io/vdb/slab_reader.h"
 #include "ops/kernels/measure/grid_difference.h"
 #include "vdbdither/engine/comma_list.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

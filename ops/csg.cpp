@@ -5,9 +5,10 @@
 
 #include "io/vdb/slab_reader.h"
 #include "ops/kernels/leaf/part_index.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
-#include "vdbdither/engine/operator.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -41,19 +42,18 @@ class CsgOperator : public Filter {
                  : !intersect_.empty() ? Csg::intersect
                                        : Csg::subtract;
     const std::string& path = unite_ + intersect_ + subtract_;
-    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
+    const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
     other_ = std::make_unique<SlabReader>(path, std::vector<std::string>{});
     const Schema& second = other_->schema();
     checkLattices(in.lattice, second.lattice, path);
     try {
-      empty_ = findGrid<FloatGrid>(second.grids, "surface");
+      empty_ = findGrid<FloatGrid>(second.grids, surface_grid);
     } catch (const DataError& error) {
       throw DataError("'" + path + "': " + error.what());
     }
 
-    Schema out = in;
-    out.grids["surface"] = emptyCombined(*surface, *empty_);
-    for (const char* name : {"N", "closest"}) out.grids.erase(name);
+    Schema out = withoutSurfaceExtras(in);
+    out.grids[surface_grid] = emptyCombined(*surface, *empty_);
     out.leaves_per_row += second.leaves_per_row;
     if (in.leaves == 0 || second.leaves == 0) {
       out.leaves = out.surface_leaves = 0;
@@ -64,14 +64,14 @@ class CsgOperator : public Filter {
     if (operation_ == Csg::unite) {
       out.lattice.box.expand(second.lattice.box);
       planParts(in, second, path);
-      out.grids["part"] = emptyParts(*surface);
+      out.grids[part_grid] = emptyParts(*surface);
     }
     return out;
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
-    std::vector<Read> reads{{"surface", Reach::point()}};
-    if (first_has_parts_) reads.push_back({"part", Reach::point()});
+    std::vector<Read> reads{{surface_grid, Reach::point()}};
+    if (first_has_parts_) reads.push_back({part_grid, Reach::point()});
     return reads;
   }
 
@@ -82,21 +82,21 @@ class CsgOperator : public Filter {
   [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 14}; }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
-    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
+    const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
     const ZRange there = intersection(in.core, other_->schema().lattice.layers());
     const Grids second = there.empty() ? Grids{} : other_->run(there);
     const auto others =
-        second.contains("surface") ? findGrid<FloatGrid>(second, "surface") : empty_;
-    Grids out{{"surface", combined(*surface, *others, operation_, in.core)}};
+        second.contains(surface_grid) ? findGrid<FloatGrid>(second, surface_grid) : empty_;
+    Grids out{{surface_grid, combined(*surface, *others, operation_, in.core)}};
     if (operation_ != Csg::unite) return out;
-    const auto parts = first_has_parts_ ? findGrid<Int32Grid>(in.grids, "part") : nullptr;
-    const auto others_parts = second_has_parts_ && second.contains("part")
-                                  ? findGrid<Int32Grid>(second, "part")
+    const auto parts = first_has_parts_ ? findGrid<Int32Grid>(in.grids, part_grid) : nullptr;
+    const auto others_parts = second_has_parts_ && second.contains(part_grid)
+                                  ? findGrid<Int32Grid>(second, part_grid)
                                   : nullptr;
     const auto united = unitedParts(*surface, *others, parts.get(), others_parts.get(),
                                     first_parts_, priority_ == "second", in.core);
     united->insertMeta(*emptyParts(*surface));
-    out["part"] = united;
+    out[part_grid] = united;
     return out;
   }
 
@@ -111,15 +111,15 @@ class CsgOperator : public Filter {
   }
 
   void planParts(const Schema& first, const Schema& second, const std::string& path) {
-    first_has_parts_ = first.grids.contains("part");
-    second_has_parts_ = second.grids.contains("part");
+    first_has_parts_ = first.grids.contains(part_grid);
+    second_has_parts_ = second.grids.contains(part_grid);
     first_parts_ = first_has_parts_ ? partsOf(first.grids, "what comes") : 1;
     parts_ = first_parts_ + (second_has_parts_ ? partsOf(second.grids, "'" + path + "'") : 1);
   }
 
   static int partsOf(const Grids& grids, const std::string& where) {
     const auto count =
-        findGrid<Int32Grid>(grids, "part")->getMetadata<openvdb::Int32Metadata>(part_count_key);
+        findGrid<Int32Grid>(grids, part_grid)->getMetadata<openvdb::Int32Metadata>(part_count_key);
     if (!count)
       throw DataError(where + ": grid 'part' does not say how many there are (its metadata " +
                       part_count_key + "); make it again");
@@ -128,7 +128,7 @@ class CsgOperator : public Filter {
 
   [[nodiscard]] Int32Grid::Ptr emptyParts(const FloatGrid& surface) const {
     auto grid = Int32Grid::create(0);
-    grid->setName("part");
+    grid->setName(part_grid);
     grid->setTransform(surface.transform().copy());
     grid->insertMeta(part_count_key, openvdb::Int32Metadata(parts_));
     return grid;

@@ -6,12 +6,13 @@
 #include "io/file/data_files.h"
 #include "io/vdb/mask_cache.h"
 #include "io/vdb/vdb.h"
-#include "ops/kernels/mask/mask_tile.h"
 #include "ops/kernels/dither/shape_dither.h"
 #include "ops/kernels/leaf/solid.h"
+#include "ops/kernels/mask/mask_tile.h"
 #include "ops/kernels/mask/threshold_mask.h"
-#include "vdbdither/model/find_grid.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -25,7 +26,7 @@ ThresholdMask readMask(const std::filesystem::path& path) {
     throw UsageError("--mask: no such file '" + path.string() + "'");
   }
   try {
-    const GridConstPtr grid = readGrid(path, "mask");
+    const GridConstPtr grid = readGrid(path, mask_grid);
     const auto mask = openvdb::gridConstPtrCast<FloatGrid>(grid);
     if (!mask) throw DataError("a mask is a grid of float, not of " + grid->valueType());
     return ThresholdMask(*mask);
@@ -65,9 +66,9 @@ class Dither : public Filter {
   }
 
   Schema plan(const Schema& in) override {
-    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
-    has_normals_ = in.grids.contains("N");
-    if (has_normals_) findGrid<Vec3SGrid>(in.grids, "N");
+    const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
+    has_normals_ = in.grids.contains(normal_grid);
+    if (has_normals_) findGrid<Vec3SGrid>(in.grids, normal_grid);
 
     dither_.pitch_mm = in.lattice.pitch_mm;
     const bool best = preset_ == "best";
@@ -85,16 +86,16 @@ class Dither : public Filter {
     checkBand(surface->background());
 
     Schema out = in;
-    out.grids["solid"] = makeSolidGrid(surface->transform());
-    if (displaced_) out.grids["displaced"] = makeDisplacedGrid(*surface);
+    out.grids[solid_grid] = makeSolidGrid(surface->transform());
+    if (displaced_) out.grids[displaced_grid] = makeDisplacedGrid(*surface);
     return out;
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
     const ShapeDither::Layers reach = dither_.reach(has_normals_);
-    std::vector<Read> reads{{"surface", Reach::stencil(reach.surface)}};
+    std::vector<Read> reads{{surface_grid, Reach::stencil(reach.surface)}};
     if (has_normals_ && dither_.amplitude != 0)
-      reads.push_back({"N", Reach::stencil(reach.normals)});
+      reads.push_back({normal_grid, Reach::stencil(reach.normals)});
     return reads;
   }
 
@@ -108,13 +109,14 @@ class Dither : public Filter {
   }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
-    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
-    const auto normals =
-        has_normals_ && dither_.amplitude != 0 ? findGrid<Vec3SGrid>(in.grids, "N") : nullptr;
+    const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
+    const auto normals = has_normals_ && dither_.amplitude != 0
+                             ? findGrid<Vec3SGrid>(in.grids, normal_grid)
+                             : nullptr;
     const ShapeDither::Result result =
         dither_.run(*surface, normals.get(), in.core, in.valid, displaced_);
-    Grids out{{"solid", result.solid}};
-    if (displaced_) out["displaced"] = result.displaced;
+    Grids out{{solid_grid, result.solid}};
+    if (displaced_) out[displaced_grid] = result.displaced;
     return out;
   }
 

@@ -1,8 +1,8 @@
 #include <filesystem>
 
-#include "vdbdither/engine/command.h"
-#include "vdbdither/engine/manual.h"
 #include "io/file/staged_output.h"
+#include "vdbdither/engine/manual.h"
+#include "vdbdither/engine/tool.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -10,7 +10,7 @@ namespace vdbdither {
 namespace {
 
 /// Writes the manuals that are made from what operators and commands declare.
-class Docs : public Command {
+class Docs : public Tool {
  public:
   void declare(Options& options) override {
     options.positional("kind", kind_, "markdown, man or completion");
@@ -45,8 +45,8 @@ class Docs : public Command {
 
 }  // namespace
 
-extern const CommandInfo docs;
-const CommandInfo docs{"docs", "Writes the manuals", "docs markdown docs/operators",
-                       []() -> std::unique_ptr<Command> { return std::make_unique<Docs>(); }, true};
+extern const ToolInfo docs;
+const ToolInfo docs{"docs", "Writes the manuals", "docs markdown docs/operators",
+                    []() -> std::unique_ptr<Tool> { return std::make_unique<Docs>(); }, true};
 
 }  // namespace vdbdither

@@ -10,9 +10,10 @@
 
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/leaf/surface_leaves.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
-#include "vdbdither/engine/operator.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -33,13 +34,13 @@ class Hollow : public Filter {
 
   Schema plan(const Schema& in) override {
     if (!(thickness_mm_ > 0)) throw UsageError("--thickness: give a length above zero");
-    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
+    const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
     lattice_ = in.lattice;
     planBand(*surface);
     drains_.clear();
     for (const std::string& text : drains_given_) drains_.push_back(drainFrom(text));
 
-    Schema out = in;
+    Schema out = withoutSurfaceExtras(in);
     // The band outside has served: what the box was larger for it would be empty layers.
     if (statesHeldBand(*surface)) {
       for (int axis = 0; axis < 3; ++axis) {
@@ -48,18 +49,19 @@ class Hollow : public Filter {
         out.lattice.box.max()[axis] -= steps;
       }
     }
-    out.grids["surface"] = emptySurface(*surface, background_mm_);
-    for (const char* name : {"N", "closest"}) out.grids.erase(name);
+    out.grids[surface_grid] = emptySurface(*surface, background_mm_);
     return out;
   }
 
-  [[nodiscard]] std::vector<Read> reads() const override { return {{"surface", Reach::point()}}; }
+  [[nodiscard]] std::vector<Read> reads() const override {
+    return {{surface_grid, Reach::point()}};
+  }
 
   [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 6}; }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
-    return {{"surface", hollowed(*findGrid<FloatGrid>(in.grids, "surface"), lattice_, thickness_mm_,
-                                 drains_, background_mm_, in.core)}};
+    return {{surface_grid, hollowed(*findGrid<FloatGrid>(in.grids, surface_grid), lattice_,
+                                    thickness_mm_, drains_, background_mm_, in.core)}};
   }
 
  private:

@@ -10,10 +10,11 @@
 #include "io/profile/printer_profile.h"
 #include "io/vdb/vdb.h"
 #include "ops/kernels/measure/grid_summary.h"
-#include "vdbdither/model/errors.h"
-#include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/run_options.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
@@ -234,7 +235,7 @@ class Info : public Sink {
 
   [[nodiscard]] std::vector<std::string> history() const {
     std::vector<std::string> lines;
-    std::istringstream text(metadata("vdbdither:history"));
+    std::istringstream text(metadata(history_key));
     for (std::string line; std::getline(text, line);) lines.push_back(line);
     return lines;
   }
@@ -257,7 +258,7 @@ class Info : public Sink {
     for (const auto& [name, summary] : summaries_) {
       json["grids"].push_back(gridJson(name, *schema_.grids.at(name), summary));
     }
-    const ordered_json printer = ordered_json::parse(metadata("vdbdither:printer"), nullptr, false);
+    const ordered_json printer = ordered_json::parse(metadata(printer_key), nullptr, false);
     if (!printer.is_discarded()) json["printer"] = printer;
     json["history"] = history();
     return json.dump() + "\n";
@@ -283,7 +284,7 @@ class Info : public Sink {
         entry["greatest"] = summary.greatest[0];
       }
     }
-    if (name == "material") {
+    if (name == material_grid) {
       entry["materials"] = ordered_json::array();
       for (const auto& [value, voxels] : summary.counts) {
         entry["materials"].push_back(
@@ -307,7 +308,7 @@ class Info : public Sink {
            << tripleText(lattice.box.min()) << " to " << tripleText(lattice.box.max()) << "\n";
       if (layers_ != lattice.layers().size()) text << "layers    " << layers_ << " of them\n";
     }
-    if (const std::string printer = metadata("vdbdither:printer"); !printer.empty()) {
+    if (const std::string printer = metadata(printer_key); !printer.empty()) {
       const PrinterProfile profile = printerProfileFromJson(printer);
       text << "printer   " << profile.name << ", " << profile.title << "\n";
     }
@@ -341,7 +342,7 @@ class Info : public Sink {
     text << ", " << bytesText(static_cast<double>(summary.leaf_bytes));
     if (isCarried(grid)) text << " in " << summary.leaves << " leaves";
     text << "\n";
-    if (name != "material") return;
+    if (name != material_grid) return;
     for (const auto& [value, voxels] : summary.counts) {
       const std::string known = materialName(value);
       text << "          " << value << " " << (known.empty() ? "(not in the table)" : known) << ": "

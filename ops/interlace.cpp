@@ -3,8 +3,9 @@
 #include <cmath>
 
 #include "ops/kernels/leaf/solid.h"
-#include "vdbdither/model/find_grid.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -22,7 +23,7 @@ class Interlace : public Filter {
   /// A refined lattice gives way to the plain one, and the grids on it end here: only `solid` comes
   /// out.
   Schema plan(const Schema& in) override {
-    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
+    const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
     const openvdb::Vec3d& origin_mm = in.lattice.origin_mm;
     refined_ = origin_mm != openvdb::Vec3d(0.0);
     Schema out = in;
@@ -44,18 +45,20 @@ class Interlace : public Filter {
     } else {
       plain_ = surface->transform().copy();
     }
-    out.grids["solid"] = makeSolidGrid(*plain_);
+    out.grids[solid_grid] = makeSolidGrid(*plain_);
     return out;
   }
 
-  [[nodiscard]] std::vector<Read> reads() const override { return {{"surface", Reach::point()}}; }
+  [[nodiscard]] std::vector<Read> reads() const override {
+    return {{surface_grid, Reach::point()}};
+  }
 
   [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 1.6}; }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
-    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
-    return {{"solid", refined_ ? interlacedByPicking(*surface, in.core, *plain_)
-                               : interlacedByInterpolation(*surface, in.core)}};
+    const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
+    return {{solid_grid, refined_ ? interlacedByPicking(*surface, in.core, *plain_)
+                                  : interlacedByInterpolation(*surface, in.core)}};
   }
 
  private:

@@ -5,8 +5,9 @@
 
 #include "ops/kernels/mask/gradient_noise.h"
 #include "ops/kernels/mask/mask_tile.h"
-#include "vdbdither/model/errors.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -82,7 +83,7 @@ class Mask : public Source {
     const Coord size = tileSize();
     Schema schema;
     schema.lattice.box = openvdb::CoordBBox(Coord(0, 0, 0), size.offsetBy(-1));
-    schema.grids["mask"] = emptyGrid();
+    schema.grids[mask_grid] = emptyGrid();
     const auto leaves = [](int voxels) { return (voxels + leaf_layers - 1) / leaf_layers; };
     schema.leaves_per_row = leaves(size.x()) * leaves(size.y());
     schema.leaves = schema.surface_leaves = schema.leaves_per_row * leaves(size.z());
@@ -111,7 +112,7 @@ class Mask : public Source {
     const openvdb::FloatGrid::Ptr grid = emptyGrid();
     const ZRange layers = intersection(core, {0, tileSize().z()});
     if (!layers.empty()) addThresholds(ranks_, layers.begin, layers.end, *grid);
-    return {{"mask", grid}};
+    return {{mask_grid, grid}};
   }
 
  private:

@@ -8,10 +8,11 @@
 
 #include "io/file/staged_output.h"
 #include "ops/kernels/mask/slice_spectrum.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 
@@ -35,7 +36,7 @@ class MaskSpectrum : public Sink {
   }
 
   void plan(const Schema& in) override {
-    findGrid<openvdb::FloatGrid>(in.grids, "mask");
+    findGrid<openvdb::FloatGrid>(in.grids, mask_grid);
     box_ = in.lattice.box;
     if (box_.empty()) throw DataError("there is no mask to look at: the lattice has no voxels");
     for (int axis = 0; axis < 3; ++axis) {
@@ -71,7 +72,7 @@ class MaskSpectrum : public Sink {
   }
 
   void write(const Slab& in) override {
-    const auto grid = findGrid<openvdb::FloatGrid>(in.grids, "mask");
+    const auto grid = findGrid<openvdb::FloatGrid>(in.grids, mask_grid);
     if (!metadata_) metadata_ = grid->copyMeta();
     for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel) {
       openvdb::CoordBBox where;

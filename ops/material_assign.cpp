@@ -10,10 +10,11 @@
 #include "io/profile/printer_profile.h"
 #include "ops/kernels/printing/depth_bands.h"
 #include "vdbdither/engine/comma_list.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 
@@ -82,28 +83,28 @@ class MaterialAssign : public Filter {
 
   Schema plan(const Schema& in) override {
     lattice_ = in.lattice;
-    const auto solid = findGrid<BoolGrid>(in.grids, "solid");
+    const auto solid = findGrid<BoolGrid>(in.grids, solid_grid);
     if (shell_.empty() != core_.empty())
       throw UsageError("--shell and --core go together; give both");
     if (!shell_.empty() + !parts_.empty() + !material_.empty() > 1) {
       throw UsageError("--material, --parts and --shell exclude each other; give one");
     }
-    if (!parts_.empty()) findGrid<Int32Grid>(in.grids, "part");
+    if (!parts_.empty()) findGrid<Int32Grid>(in.grids, part_grid);
     planTable(in);
 
     Schema out = in;
     auto material = Int32Grid::create(0);
-    material->setName("material");
+    material->setName(material_grid);
     material->setTransform(solid->transform().copy());
-    out.grids["material"] = material;
-    out.metadata[std::string(materials_key)] = toJson(table_);
+    out.grids[material_grid] = material;
+    out.metadata[materials_key] = toJson(table_);
     return out;
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
     std::vector<Read> reads = {
-        {"solid", Reach::stencil(depthReach(bands_, lattice_.pitch_mm.z()))}};
-    if (!parts_.empty()) reads.push_back({"part", Reach::point()});
+        {solid_grid, Reach::stencil(depthReach(bands_, lattice_.pitch_mm.z()))}};
+    if (!parts_.empty()) reads.push_back({part_grid, Reach::point()});
     return reads;
   }
 
@@ -112,7 +113,7 @@ class MaterialAssign : public Filter {
   }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
-    const auto solid = findGrid<BoolGrid>(in.grids, "solid");
+    const auto solid = findGrid<BoolGrid>(in.grids, solid_grid);
     Int32Grid::Ptr material;
     if (!bands_.empty()) {
       material = valueByDepth(*solid, lattice_.pitch_mm, lattice_.box, in.core, in.valid, bands_,
@@ -121,16 +122,16 @@ class MaterialAssign : public Filter {
       material = Int32Grid::create(onesWhereActive(solid->tree()));
       material->setTransform(solid->transform().copy());
       if (!parts_.empty())
-        takeParts(material->tree(), findGrid<Int32Grid>(in.grids, "part")->tree());
+        takeParts(material->tree(), findGrid<Int32Grid>(in.grids, part_grid)->tree());
     }
-    material->setName("material");
-    return {{"material", material}};
+    material->setName(material_grid);
+    return {{material_grid, material}};
   }
 
  private:
   void planTable(const Schema& in) {
     std::vector<Material> known;
-    if (const auto printer = in.metadata.find("vdbdither:printer"); printer != in.metadata.end()) {
+    if (const auto printer = in.metadata.find(printer_key); printer != in.metadata.end()) {
       known = printerProfileFromJson(printer->second).materials;
     }
     table_.clear();

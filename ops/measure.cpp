@@ -7,22 +7,23 @@
 
 #include <nlohmann/json.hpp>
 
+#include "io/file/staged_output.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/mesh/mesh_writer.h"
-#include "io/file/staged_output.h"
-#include "ops/kernels/measure/axis_errors.h"
-#include "ops/kernels/mesh/closest_point.h"
-#include "ops/kernels/picture/diverging_colours.h"
-#include "ops/kernels/measure/facet_roughness.h"
 #include "ops/kernels/contour/grid_surface.h"
+#include "ops/kernels/measure/axis_errors.h"
+#include "ops/kernels/measure/facet_roughness.h"
+#include "ops/kernels/measure/surface_error.h"
+#include "ops/kernels/measure/voxel_components.h"
+#include "ops/kernels/mesh/closest_point.h"
+#include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/mesh_repair.h"
-#include "ops/kernels/measure/surface_error.h"
 #include "ops/kernels/mesh/taubin.h"
-#include "ops/kernels/measure/voxel_components.h"
+#include "ops/kernels/picture/diverging_colours.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

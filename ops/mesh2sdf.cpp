@@ -4,15 +4,17 @@
 #include "io/mesh/mesh_reader.h"
 #include "io/profile/printer_profile.h"
 #include "io/profile/target_lattice.h"
-#include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/distance/mesh_distance.h"
+#include "ops/kernels/leaf/held_band.h"
+#include "ops/kernels/leaf/part_index.h"
+#include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/mesh_repair.h"
-#include "ops/kernels/leaf/part_index.h"
 #include "ops/kernels/mesh/winding_surface.h"
-#include "vdbdither/model/errors.h"
-#include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 
@@ -87,7 +89,7 @@ class MeshToSdf : public Source {
     if (parts_.empty()) return grids;
     std::vector<openvdb::FloatGrid::ConstPtr> surfaces;
     for (const MeshDistance& part : parts_) surfaces.push_back(part.run(core).surface);
-    grids["part"] = partIndex(surfaces);
+    grids[part_grid] = partIndex(surfaces);
     return grids;
   }
 
@@ -250,7 +252,7 @@ class MeshToSdf : public Source {
     // 3 m and 0.1 mm, as far as floats of a file tell.
     constexpr double largest_mm = 3000 * (1 - 1e-6);
     constexpr double least_mm = 0.1 * (1 + 1e-6);
-    const auto profile = schema.metadata.find("vdbdither:printer");
+    const auto profile = schema.metadata.find(printer_key);
     const Vec3d build_mm = profile == schema.metadata.end()
                                ? Vec3d(0.0)
                                : printerProfileFromJson(profile->second).build_mm;
@@ -342,9 +344,9 @@ class MeshToSdf : public Source {
 
   [[nodiscard]] Grids gridsOf(const DistanceGrids& made) const {
     setHeldBandMm(*made.surface, held_band_mm_);
-    Grids grids{{"surface", made.surface}};
-    if (made.normals) grids["N"] = made.normals;
-    if (made.closest) grids["closest"] = made.closest;
+    Grids grids{{surface_grid, made.surface}};
+    if (made.normals) grids[normal_grid] = made.normals;
+    if (made.closest) grids[closest_grid] = made.closest;
     return grids;
   }
 

@@ -6,9 +6,9 @@
 #include "io/mesh/mesh_writer.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/mesh/taubin.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

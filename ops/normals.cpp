@@ -1,6 +1,7 @@
 #include "ops/kernels/distance/gradient.h"
-#include "vdbdither/model/find_grid.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -16,14 +17,15 @@ class Normals : public Filter {
   Schema plan(const Schema& in) override {
     Schema out = in;
     pitch_mm_ = in.lattice.pitch_mm;
-    given_ = in.grids.contains("N");
+    given_ = in.grids.contains(normal_grid);
     if (given_) return out;
-    out.grids["N"] = makeNormalGrid(findGrid<FloatGrid>(in.grids, "surface")->transform());
+    out.grids[normal_grid] =
+        makeNormalGrid(findGrid<FloatGrid>(in.grids, surface_grid)->transform());
     return out;
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
-    return given_ ? std::vector<Read>{} : std::vector<Read>{{"surface", Reach::stencil(1)}};
+    return given_ ? std::vector<Read>{} : std::vector<Read>{{surface_grid, Reach::stencil(1)}};
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
@@ -32,8 +34,8 @@ class Normals : public Filter {
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     if (given_) return {};
-    return {{"N", outwardNormals(*findGrid<FloatGrid>(in.grids, "surface"), pitch_mm_, in.core,
-                                 in.valid)}};
+    return {{normal_grid, outwardNormals(*findGrid<FloatGrid>(in.grids, surface_grid), pitch_mm_,
+                                         in.core, in.valid)}};
   }
 
  private:

@@ -4,12 +4,13 @@
 #include <string>
 
 #include "io/image/grey_image.h"
+#include "ops/kernels/distance/surface_offset.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/leaf/surface_leaves.h"
-#include "ops/kernels/distance/surface_offset.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
-#include "vdbdither/engine/operator.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -40,7 +41,7 @@ class Offset : public Filter {
   }
 
   Schema plan(const Schema& in) override {
-    const auto surface = findGrid<FloatGrid>(in.grids, "surface");
+    const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
     if (by_mm_ == 0 && map_.empty() && grid_.empty())
       throw UsageError("give an offset: --by, --map or --grid");
     if (height_mm_ == 0 && !map_.empty()) throw UsageError("--map needs --height, in mm");
@@ -59,15 +60,14 @@ class Offset : public Filter {
     if (!grid_.empty()) findGrid<FloatGrid>(in.grids, grid_);
     checkBand();
 
-    Schema out = in;
-    out.grids["surface"] = emptySurface(*surface, offset_.backgroundMm());
-    for (const char* name : {"N", "closest"}) out.grids.erase(name);
+    Schema out = withoutSurfaceExtras(in);
+    out.grids[surface_grid] = emptySurface(*surface, offset_.backgroundMm());
     return out;
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
     const SurfaceOffset::Layers reach = offset_.reach();
-    std::vector<Read> reads{{"surface", Reach::stencil(reach.surface)}};
+    std::vector<Read> reads{{surface_grid, Reach::stencil(reach.surface)}};
     if (!grid_.empty()) reads.push_back({grid_, Reach::stencil(reach.heights)});
     return reads;
   }
@@ -76,8 +76,8 @@ class Offset : public Filter {
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto heights = grid_.empty() ? nullptr : findGrid<FloatGrid>(in.grids, grid_);
-    return {{"surface", offset_.run(*findGrid<FloatGrid>(in.grids, "surface"), heights.get(),
-                                    in.core, in.valid)}};
+    return {{surface_grid, offset_.run(*findGrid<FloatGrid>(in.grids, surface_grid), heights.get(),
+                                       in.core, in.valid)}};
   }
 
  private:

@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "vdbdither/engine/command.h"
-#include "io/profile/printer_profile.h"
 #include "io/file/standard_streams.h"
+#include "io/profile/printer_profile.h"
+#include "vdbdither/engine/tool.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -22,7 +22,7 @@ std::string lengthsText(const openvdb::Vec3d& mm) {
 }
 
 /// The profiles there are, one of them, or whether a file is one.
-class Printers : public Command {
+class Printers : public Tool {
  public:
   void declare(Options& options) override {
     options.positional("action", action_, "list (as without), show or check", false);
@@ -97,9 +97,9 @@ class Printers : public Command {
 
 }  // namespace
 
-extern const CommandInfo printers;
-const CommandInfo printers{
-    "printers", "Lists, shows and checks printer profiles", "printers show mimaki-3duj-553",
-    []() -> std::unique_ptr<Command> { return std::make_unique<Printers>(); }};
+extern const ToolInfo printers;
+const ToolInfo printers{"printers", "Lists, shows and checks printer profiles",
+                        "printers show mimaki-3duj-553",
+                        []() -> std::unique_ptr<Tool> { return std::make_unique<Printers>(); }};
 
 }  // namespace vdbdither

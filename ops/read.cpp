@@ -2,9 +2,9 @@
 
 #include "io/vdb/slab_reader.h"
 #include "vdbdither/engine/comma_list.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
-#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -6,17 +6,17 @@
 #include <utility>
 #include <vector>
 
+#include "io/file/staged_output.h"
 #include "io/image/exr.h"
-#include "io/mesh/mesh_reader.h"
 #include "io/image/picture.h"
 #include "io/image/png_runs.h"
-#include "io/file/staged_output.h"
+#include "io/mesh/mesh_reader.h"
 #include "ops/kernels/contour/grid_surface.h"
-#include "ops/kernels/picture/ray_picture.h"
 #include "ops/kernels/contour/voxel_faces.h"
+#include "ops/kernels/picture/ray_picture.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -5,15 +5,16 @@
 
 #include <tbb/parallel_reduce.h>
 
-#include "io/vdb/frames.h"
 #include "io/profile/target_lattice.h"
+#include "io/vdb/frames.h"
 #include "io/vdb/vdb.h"
+#include "ops/kernels/distance/zero_set_distance.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/mesh/mesh_placement.h"
-#include "ops/kernels/distance/zero_set_distance.h"
-#include "vdbdither/model/errors.h"
-#include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 
@@ -108,7 +109,7 @@ class Resample : public Source {
   [[nodiscard]] Grids run(ZRange core) const override {
     const FloatGrid::Ptr surface = field_->run(core);
     setHeldBandMm(*surface, held_band_mm_);
-    return {{"surface", surface}};
+    return {{surface_grid, surface}};
   }
 
  private:
@@ -119,7 +120,7 @@ class Resample : public Source {
       throw UsageError("nothing is piped in; name a file: resample part.vdb");
     const VdbContents contents =
         isPipe() ? FrameReader::readWhole(STDIN_FILENO, "standard input") : readVdb(path_);
-    if (const auto history = contents.metadata.find("vdbdither:history");
+    if (const auto history = contents.metadata.find(history_key);
         history != contents.metadata.end()) {
       schema.metadata.insert(*history);
     }
@@ -145,8 +146,8 @@ class Resample : public Source {
       ++count;
     }
     if (grid_name_.empty()) {
-      if (grids.contains("surface")) {
-        grid_name_ = "surface";
+      if (grids.contains(surface_grid)) {
+        grid_name_ = surface_grid;
       } else if (count == 1) {
         grid_name_ = numbers;
       } else {

@@ -5,10 +5,11 @@
 #include "io/profile/printer_profile.h"
 #include "ops/kernels/printing/gaussian_spread.h"
 #include "vdbdither/engine/comma_list.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 
@@ -26,7 +27,7 @@ class Simulate : public Filter {
   }
 
   Schema plan(const Schema& in) override {
-    const auto solid = findGrid<openvdb::BoolGrid>(in.grids, "solid");
+    const auto solid = findGrid<openvdb::BoolGrid>(in.grids, solid_grid);
     box_ = in.lattice.box;
     spread_.emplace(in.lattice.pitch_mm, spreadMm(in));
     constexpr int furthest = 500;
@@ -35,26 +36,26 @@ class Simulate : public Filter {
       throw UsageError("--spread: droplets would reach over more than " + std::to_string(furthest) +
                        " voxels");
     Schema out = in;
-    out.grids["printed"] = makePrintedGrid(solid->transform());
+    out.grids[printed_grid] = makePrintedGrid(solid->transform());
     return out;
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
-    return {{"solid", Reach::stencil(spread_->reach().z())}};
+    return {{solid_grid, Reach::stencil(spread_->reach().z())}};
   }
 
   [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 42}; }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
-    return {{"printed", spread_->run(*findGrid<openvdb::BoolGrid>(in.grids, "solid"), box_, in.core,
-                                     in.valid)}};
+    return {{printed_grid, spread_->run(*findGrid<openvdb::BoolGrid>(in.grids, solid_grid), box_,
+                                        in.core, in.valid)}};
   }
 
  private:
   [[nodiscard]] Vec3d spreadMm(const Schema& in) const {
     constexpr double usual_mm = 0.05;
     if (spread_text_.empty()) {
-      const auto profile = in.metadata.find("vdbdither:printer");
+      const auto profile = in.metadata.find(printer_key);
       if (profile == in.metadata.end()) return Vec3d(usual_mm);
       const Vec3d stated = printerProfileFromJson(profile->second).point_spread_mm;
       return stated.isZero() ? Vec3d(usual_mm) : stated;

@@ -11,17 +11,18 @@
 
 #include "io/file/digest.h"
 #include "io/image/exr.h"
-#include "io/profile/material_table.h"
 #include "io/image/png_runs.h"
+#include "io/image/tiff.h"
+#include "io/profile/material_table.h"
 #include "io/stack/slice_runs.h"
 #include "io/stack/stack_files.h"
 #include "io/stack/stack_preview.h"
-#include "io/image/tiff.h"
+#include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/version.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/operator.h"
-#include "vdbdither/version.h"
 
 namespace vdbdither {
 
@@ -127,7 +128,7 @@ class SliceExport : public Sink {
 
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
     std::vector<std::string> names{source_};
-    if (format_ == "exr") names.insert(names.end(), {"surface", "N"});
+    if (format_ == "exr") names.insert(names.end(), {surface_grid, normal_grid});
     return names;
   }
 
@@ -166,8 +167,8 @@ class SliceExport : public Sink {
   [[nodiscard]] bool oneStackEach() const { return format_ == "png1" || format_ == "tiff1"; }
 
   void planMaterials() {
-    if (schema_.grids.contains("material")) {
-      findGrid<openvdb::Int32Grid>(schema_.grids, "material");
+    if (schema_.grids.contains(material_grid)) {
+      findGrid<openvdb::Int32Grid>(schema_.grids, material_grid);
       const auto table = schema_.metadata.find(materials_key);
       if (table == schema_.metadata.end()) {
         throw DataError(
@@ -175,11 +176,11 @@ class SliceExport : public Sink {
             "material-assign");
       }
       materials_ = materialTableFromJson(table->second);
-      source_ = "material";
-    } else if (schema_.grids.contains("solid")) {
-      findGrid<openvdb::BoolGrid>(schema_.grids, "solid");
+      source_ = material_grid;
+    } else if (schema_.grids.contains(solid_grid)) {
+      findGrid<openvdb::BoolGrid>(schema_.grids, solid_grid);
       materials_ = {{"solid", {240, 240, 240, 255}}};
-      source_ = "solid";
+      source_ = solid_grid;
     } else {
       throw UsageError(
           "needs a grid 'material' or 'solid'; put dither, and material-assign where there are "
@@ -207,12 +208,12 @@ class SliceExport : public Sink {
   void planChannels() {
     constexpr std::size_t most_in_half = 2048;
     channels_ = {{"material", materials_.size() <= most_in_half}};
-    if (schema_.grids.contains("surface")) {
-      findGrid<openvdb::FloatGrid>(schema_.grids, "surface");
+    if (schema_.grids.contains(surface_grid)) {
+      findGrid<openvdb::FloatGrid>(schema_.grids, surface_grid);
       channels_.push_back({"distance", exr_half_});
     }
-    if (schema_.grids.contains("N")) {
-      findGrid<openvdb::Vec3SGrid>(schema_.grids, "N");
+    if (schema_.grids.contains(normal_grid)) {
+      findGrid<openvdb::Vec3SGrid>(schema_.grids, normal_grid);
       for (const char* name : {"N.x", "N.y", "N.z"}) channels_.push_back({name, true});
     }
   }
@@ -226,7 +227,7 @@ class SliceExport : public Sink {
 
   void writeLayers(const Slab& in, ZRange layers) {
     std::vector<RunImage> images =
-        source_ == "material"
+        source_ == material_grid
             ? sliceRuns(*findGrid<openvdb::Int32Grid>(in.grids, source_), frame_, layers)
             : sliceRuns(*findGrid<openvdb::BoolGrid>(in.grids, source_), frame_, layers);
     // They are kept here, for TBB forgets what is on its way when one of the steps fails.
@@ -348,11 +349,11 @@ class SliceExport : public Sink {
           begin = run.end;
         }
       } else if (name == "distance") {
-        fill_row(row, values, *findGrid<openvdb::FloatGrid>(in.grids, "surface"),
+        fill_row(row, values, *findGrid<openvdb::FloatGrid>(in.grids, surface_grid),
                  [](float value) { return value; });
       } else {
         const int axis = name.back() - 'x';
-        fill_row(row, values, *findGrid<openvdb::Vec3SGrid>(in.grids, "N"),
+        fill_row(row, values, *findGrid<openvdb::Vec3SGrid>(in.grids, normal_grid),
                  [axis](const openvdb::Vec3s& normal) { return normal[axis]; });
       }
     };
@@ -396,7 +397,7 @@ class SliceExport : public Sink {
     };
     ordered_json manifest;
     manifest["creator"] = std::string("vdbdither ") + version;
-    const ordered_json printer = ordered_json::parse(metadata("vdbdither:printer"), nullptr, false);
+    const ordered_json printer = ordered_json::parse(metadata(printer_key), nullptr, false);
     manifest["printer"] = printer.is_discarded() ? ordered_json() : printer;
     manifest["format"] = format_;
     manifest["grid"] = source_;
@@ -419,7 +420,7 @@ class SliceExport : public Sink {
            {"ml", static_cast<double>(voxels_[i + 1]) * lattice.pitch_mm.product() / 1000}});
     }
     manifest["history"] = ordered_json::array();
-    std::istringstream history(metadata("vdbdither:history"));
+    std::istringstream history(metadata(history_key));
     for (std::string line; std::getline(history, line);) manifest["history"].push_back(line);
     manifest["slices"] = slices_;
     return manifest.dump(1) + "\n";

@@ -9,15 +9,16 @@
 
 #include "io/file/digest.h"
 #include "io/image/exr.h"
-#include "io/profile/material_table.h"
 #include "io/image/png_decoder.h"
 #include "io/image/png_runs.h"
+#include "io/image/tiff.h"
+#include "io/profile/material_table.h"
 #include "io/stack/slice_runs.h"
 #include "io/stack/stack_files.h"
-#include "io/image/tiff.h"
-#include "vdbdither/model/errors.h"
-#include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 
@@ -76,15 +77,15 @@ class SliceImport : public Source {
     planColours();
     const auto transform = std::make_shared<openvdb::math::Transform>(mapOf(schema.lattice));
     auto solid = openvdb::BoolGrid::create(false);
-    solid->setName("solid");
+    solid->setName(solid_grid);
     solid->setTransform(transform->copy());
-    schema.grids["solid"] = solid;
+    schema.grids[solid_grid] = solid;
     if (tellsMaterials()) {
       auto material = openvdb::Int32Grid::create(0);
-      material->setName("material");
+      material->setName(material_grid);
       material->setTransform(transform->copy());
-      schema.grids["material"] = material;
-      schema.metadata[std::string(materials_key)] = toJson(materials_);
+      schema.grids[material_grid] = material;
+      schema.metadata[materials_key] = toJson(materials_);
     }
     prototypes_ = schema.grids;
     sampleLeaves(schema);
@@ -116,9 +117,9 @@ class SliceImport : public Source {
     const auto solid =
         std::make_shared<openvdb::BoolTree>(*material, false, true, openvdb::TopologyCopy());
     openvdb::tools::prune(*solid);
-    grids["solid"] = typed("solid", solid, openvdb::BoolGrid::Ptr());
+    grids[solid_grid] = typed(solid_grid, solid, openvdb::BoolGrid::Ptr());
     if (tellsMaterials())
-      grids["material"] = typed("material", material, openvdb::Int32Grid::Ptr());
+      grids[material_grid] = typed(material_grid, material, openvdb::Int32Grid::Ptr());
     return grids;
   }
 
@@ -153,7 +154,7 @@ class SliceImport : public Source {
       schema.lattice.box = {coord(manifest.at("box").at("min")),
                             coord(manifest.at("box").at("max"))};
       format_ = manifest.at("format");
-      of_materials_ = manifest.value("grid", "material") == "material";
+      of_materials_ = manifest.value("grid", material_grid) == material_grid;
       frame_ = {schema.lattice.box, manifest.at("padding"), manifest.at("flip_x"),
                 manifest.at("flip_y")};
       layers_.begin = manifest.at("first_layer");
@@ -163,11 +164,11 @@ class SliceImport : public Source {
       for (const ordered_json& entry : manifest.at("materials"))
         materials_.push_back({entry.at("name"), entry.at("rgba")});
       if (!manifest.at("printer").is_null())
-        schema.metadata["vdbdither:printer"] = manifest["printer"].dump();
+        schema.metadata[printer_key] = manifest["printer"].dump();
       std::string history;
       for (const ordered_json& line : manifest.at("history"))
         history += (history.empty() ? "" : "\n") + line.get<std::string>();
-      if (!history.empty()) schema.metadata["vdbdither:history"] = history;
+      if (!history.empty()) schema.metadata[history_key] = history;
       for (const ordered_json& entry : manifest.at("slices")) {
         const std::string material = entry.value("material", "");
         names_[entry.at("layer")][material] = {entry.at("file"), entry.at("sha256")};

@@ -9,12 +9,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "vdbdither/engine/command.h"
-#include "io/image/picture.h"
-#include "io/image/png_runs.h"
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
+#include "io/image/picture.h"
+#include "io/image/png_runs.h"
 #include "ops/kernels/picture/picture_similarity.h"
+#include "vdbdither/engine/tool.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -63,7 +63,7 @@ std::vector<std::uint8_t> greyPng(const Plane& map) {
 }
 
 /// How much two pictures differ, by three measures.
-class Ssim : public Command {
+class Ssim : public Tool {
  public:
   void declare(Options& options) override {
     options.positional("reference", reference_file_, "The picture that it should be (.png)");
@@ -186,13 +186,13 @@ class Ssim : public Command {
 
 }  // namespace
 
-extern const CommandInfo ssim;
-const CommandInfo ssim{
+extern const ToolInfo ssim;
+const ToolInfo ssim{
     "ssim", "How alike two pictures are: SSIM, SSIM of what the eye sees of them, and FLIP",
     "render part.stl part.png\n"
     "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! render print.png --frame "
     "part.stl\n"
     "ssim part.png print.png",
-    []() -> std::unique_ptr<Command> { return std::make_unique<Ssim>(); }};
+    []() -> std::unique_ptr<Tool> { return std::make_unique<Ssim>(); }};
 
 }  // namespace vdbdither

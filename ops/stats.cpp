@@ -8,9 +8,10 @@
 #include "io/stack/slice_runs.h"
 #include "ops/kernels/measure/histogram.h"
 #include "ops/kernels/measure/surface_area.h"
-#include "vdbdither/model/find_grid.h"
-#include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/openvdb.h"
 #include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
@@ -96,19 +97,19 @@ class Stats : public Sink {
   void plan(const Schema& in) override {
     lattice_ = in.lattice;
     const auto has = [&](const char* name) { return in.grids.contains(name); };
-    if (has("material")) {
-      findGrid<openvdb::Int32Grid>(in.grids, "material");
+    if (has(material_grid)) {
+      findGrid<openvdb::Int32Grid>(in.grids, material_grid);
       const auto table = in.metadata.find(materials_key);
       if (table != in.metadata.end()) materials_ = materialTableFromJson(table->second);
     }
-    if (has("solid")) findGrid<openvdb::BoolGrid>(in.grids, "solid");
-    if (has("surface")) {
-      if (findGrid<openvdb::FloatGrid>(in.grids, "surface")->getGridClass() !=
+    if (has(solid_grid)) findGrid<openvdb::BoolGrid>(in.grids, solid_grid);
+    if (has(surface_grid)) {
+      if (findGrid<openvdb::FloatGrid>(in.grids, surface_grid)->getGridClass() !=
           openvdb::GRID_LEVEL_SET) {
         throw DataError("grid 'surface' is no level set: it holds no distances");
       }
     }
-    for (const char* name : {"material", "solid", "surface"}) {
+    for (const char* name : {material_grid, solid_grid, surface_grid}) {
       if (has(name)) measured_.emplace_back(name);
     }
     if (!histogram_grid_.empty()) planHistogram(in);
@@ -132,19 +133,19 @@ class Stats : public Sink {
     // Few layers at a time, as their runs are not small.
     for (int z = in.core.begin; z < in.core.end;) {
       const int end = std::min(in.core.end, alignedToLeaves({z, z + 1}).end);
-      if (measures("material")) {
-        const auto grid = findGrid<openvdb::Int32Grid>(in.grids, "material");
+      if (measures(material_grid)) {
+        const auto grid = findGrid<openvdb::Int32Grid>(in.grids, material_grid);
         for (RunImage& layer : sliceRuns(*grid, frame, {z, end}))
           by_material_.add(std::move(layer));
       }
-      if (measures("solid")) {
-        const auto grid = findGrid<openvdb::BoolGrid>(in.grids, "solid");
+      if (measures(solid_grid)) {
+        const auto grid = findGrid<openvdb::BoolGrid>(in.grids, solid_grid);
         for (RunImage& layer : sliceRuns(*grid, frame, {z, end})) of_solid_.add(std::move(layer));
       }
       z = end;
     }
-    if (measures("surface")) {
-      auto surface = findGrid<openvdb::FloatGrid>(in.grids, "surface");
+    if (measures(surface_grid)) {
+      auto surface = findGrid<openvdb::FloatGrid>(in.grids, surface_grid);
       if (below_) area_mm2_ += surfaceArea(*below_, *surface, below_layers_, lattice_.pitch_mm);
       below_ = std::move(surface);
       below_layers_ = in.core;
@@ -212,7 +213,7 @@ class Stats : public Sink {
   [[nodiscard]] std::string jsonText() const {
     ordered_json all;
     all["voxel_mm3"] = lattice_.pitch_mm.product();
-    if (measures("material")) {
+    if (measures(material_grid)) {
       all["materials"] = ordered_json::array();
       for (const auto& [value, tally] : by_material_.tallies()) {
         ordered_json entry = {{"index", static_cast<std::int32_t>(value)},
@@ -221,8 +222,8 @@ class Stats : public Sink {
         all["materials"].push_back(std::move(entry));
       }
     }
-    if (measures("solid")) all["solid"] = json(solidTally());
-    if (measures("surface"))
+    if (measures(solid_grid)) all["solid"] = json(solidTally());
+    if (measures(surface_grid))
       all["surface"] = {{"area_mm2", area_mm2_}, {"estimate", "marching tetrahedra"}};
     if (histogram_) {
       all["histogram"] = {{"grid", histogram_grid_}, {"bins", ordered_json::array()}};
@@ -249,11 +250,11 @@ class Stats : public Sink {
                     facesMm2(tally));
       text += line.data();
     };
-    if (measures("material") || measures("solid"))
+    if (measures(material_grid) || measures(solid_grid))
       text += "                           voxels           ml    faces mm2\n";
     for (const auto& [value, tally] : by_material_.tallies()) row(materialName(value), tally);
-    if (measures("solid")) row("solid", solidTally());
-    if (measures("surface")) {
+    if (measures(solid_grid)) row("solid", solidTally());
+    if (measures(surface_grid)) {
       text += "surface            " + shortestText(std::round(area_mm2_ * 1e6) / 1e6) +
               " mm2 by marching tetrahedra\n";
     }

@@ -7,14 +7,14 @@
 
 #include <openvdb/tools/Prune.h>
 
-#include "io/vdb/frames.h"
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
+#include "io/vdb/frames.h"
 #include "io/vdb/vdb.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {

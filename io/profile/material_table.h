@@ -6,15 +6,13 @@
 #include <string_view>
 #include <vector>
 
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/printer.h"
 
 namespace vdbdither {
 
 /// The materials of a job: material index i is entry i − 1, as index 0 is empty space.
 using MaterialTable = std::vector<Material>;
-
-/// The metadata key under which the table travels.
-inline constexpr std::string_view materials_key = "vdbdither:materials";
 
 /// The table as one line of JSON: index, name and display colour of each; and back. Throws
 /// DataError.

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file/data_files.h"
-#include "vdbdither/model/errors.h"
 #include "vdbdither/engine/options.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 

@@ -5,8 +5,9 @@
 
 #include "io/profile/printer_profile.h"
 #include "vdbdither/engine/comma_list.h"
-#include "vdbdither/model/errors.h"
 #include "vdbdither/engine/options.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -20,7 +21,7 @@ Vec3d targetPitchMm(const std::string& printer, const std::string& pitch, Schema
         "give either --printer NAME (vdbdither printers lists them) or --pitch DX,DY,DZ");
   if (!printer.empty()) {
     const PrinterProfile profile = readPrinterProfile(printer);
-    schema.metadata["vdbdither:printer"] = toJson(profile);
+    schema.metadata[printer_key] = toJson(profile);
     return profile.pitch_mm;
   }
   const std::vector<std::string> lengths = commaList(pitch);

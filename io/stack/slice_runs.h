@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
-#include "vdbdither/model/run_image.h"
 #include "vdbdither/model/lattice.h"
 #include "vdbdither/model/openvdb.h"
+#include "vdbdither/model/run_image.h"
 
 namespace vdbdither {
 

@@ -5,8 +5,8 @@
 
 #include <openvdb/math/Vec3.h>
 
-#include "vdbdither/model/run_image.h"
 #include "vdbdither/model/lattice.h"
+#include "vdbdither/model/run_image.h"
 
 namespace vdbdither {
 

@@ -7,6 +7,7 @@
 #include "io/file/staged_output.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
@@ -44,7 +45,7 @@ bool isAsDescribed(const FloatGrid& mask, const FloatGrid& described) {
 }
 
 FloatGrid::ConstPtr kept(const fs::path& path, const FloatGrid& described) {
-  auto mask = openvdb::gridConstPtrCast<FloatGrid>(readGrid(path, "mask"));
+  auto mask = openvdb::gridConstPtrCast<FloatGrid>(readGrid(path, mask_grid));
   if (!mask || !isAsDescribed(*mask, described))
     throw DataError("'" + path.string() + "' holds another mask than its name says");
   return mask;
@@ -59,7 +60,7 @@ void keep(const fs::path& path, const FloatGrid::ConstPtr& mask) {
   }
   StagedOutput output(path, StagedOutput::Kind::file);
   VdbContents contents;
-  contents.grids["mask"] = mask;
+  contents.grids[mask_grid] = mask;
   writeVdb(output.path(), contents, VdbCodec::blosc, path);
   output.commit();
 }

@@ -15,9 +15,10 @@
 #include <openvdb/tools/ChangeBackground.h>
 
 #include "io/vdb/archive_digest.h"
-#include "vdbdither/model/errors.h"
-#include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/options.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 
@@ -354,14 +355,14 @@ Schema schemaOf(const VdbContents& contents, const std::string& where) {
     for (const auto& [name, grid] : contents.grids)
       schema.lattice.box.expand(grid->evalActiveVoxelBoundingBox());
   }
-  schema.metadata.erase("creator");
+  schema.metadata.erase(creator_key);
   return schema;
 }
 
 VdbContents contentsOf(const Schema& schema, Grids grids) {
   VdbContents contents{std::move(grids), schema.metadata};
   contents.metadata[box_key] = boxText(schema.lattice.box);
-  contents.metadata["creator"] = "vdbdither";
+  contents.metadata[creator_key] = "vdbdither";
   return contents;
 }
 

@@ -1,5 +1,6 @@
-"""The folders include one another only along ops -> io -> vdbdither and ops -> ops/kernels."""
+"""Includes follow the arrows ops -> io -> vdbdither and ops -> ops/kernels -> vdbdither/model; families form no circle."""
 
+import graphlib
 import pathlib
 import re
 import unittest
@@ -9,47 +10,77 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 def included(path):
     """The files of the project that a source names in its includes."""
-    return re.findall(r'^\s*#\s*include\s*["<]((?:vdbdither|io|ops|commands|tests)/[^">]+)', path.read_text(), re.MULTILINE)
+    return re.findall(r'^\s*#\s*include\s*["<]((?:vdbdither|io|ops|tests)/[^">]+)', path.read_text(), re.MULTILINE)
 
 
-def sources(folder):
-    return [path for path in sorted((ROOT / folder).iterdir()) if path.suffix in (".h", ".cpp")]
+def sources(folder, below=True):
+    """The sources in a folder, and those in the folders below it."""
+    found = [path for path in sorted((ROOT / folder).glob("**/*" if below else "*")) if path.suffix in (".h", ".cpp")]
+    return found
+
+
+def families(folder):
+    return sorted(path.name for path in (ROOT / folder).iterdir() if path.is_dir())
 
 
 class Arrows(unittest.TestCase):
-    def assert_includes(self, folder, *allowed, but=()):
+    def assert_includes(self, folder, *allowed, below=True):
         """Every include of every source in `folder` begins with one of `allowed`."""
-        paths = [path for path in sources(folder) if path.name not in but]
+        paths = sources(folder, below)
         self.assertTrue(paths)
         for path in paths:
             for name in included(path):
                 self.assertTrue(name.startswith(allowed), f"{path.relative_to(ROOT)} includes {name}")
 
+    def assert_no_circle(self, folder):
+        """The families of a folder include one another in one direction."""
+        arrows = {}
+        for family in families(folder):
+            named = {name for path in sources(f"{folder}/{family}") for name in included(path)}
+            arrows[family] = {name.split("/")[-2] for name in named if name.startswith(folder + "/")} - {family}
+        self.assertGreater(len(arrows), 4)
+        try:
+            list(graphlib.TopologicalSorter(arrows).static_order())
+        except graphlib.CycleError as error:
+            self.fail(f"{folder}: the families {' -> '.join(error.args[1])} form a circle")
+
+    def test_the_model_knows_nothing_above_it(self):
+        self.assert_includes("vdbdither/model", "vdbdither/model/")
+
     def test_the_engine_knows_no_operator_and_no_format(self):
-        # main.cpp is where the engine meets the file system.
-        self.assert_includes("vdbdither", "vdbdither/", but=("main.cpp",))
+        self.assert_includes("vdbdither/engine", "vdbdither/engine/", "vdbdither/model/")
 
-    def test_the_main_program_knows_no_operator(self):
-        self.assertEqual([name for name in included(ROOT / "vdbdither/program/main.cpp") if name.startswith("ops/")], [])
+    def test_the_program_knows_no_operator(self):
+        self.assert_includes("vdbdither/program", "vdbdither/", "io/")
 
-    def test_io_knows_no_operator(self):
-        self.assert_includes("io", "io/", "vdbdither/")
+    def test_io_knows_no_operator_and_no_program(self):
+        self.assert_includes("io", "io/", "vdbdither/engine/", "vdbdither/model/")
 
     def test_operators_include_no_operator(self):
-        self.assert_includes("ops", "ops/kernels/", "io/", "vdbdither/")
-
-    def test_commands_know_no_operator(self):
-        self.assert_includes("commands", "commands/", "ops/kernels/", "io/", "vdbdither/")
+        self.assert_includes("ops", "ops/kernels/", "io/", "vdbdither/engine/", "vdbdither/model/", below=False)
 
     def test_operators_have_no_headers(self):
-        self.assertEqual([path.name for path in sources("ops") if path.suffix == ".h"], [])
+        self.assertEqual([path.name for path in sources("ops", below=False) if path.suffix == ".h"], [])
 
     def test_kernels_know_no_pipeline(self):
-        vocabulary = ("errors", "grid", "lattice", "mesh", "openvdb", "visit_grid")
-        self.assert_includes("ops/kernels", "ops/kernels/", *(f"vdbdither/{name}.h" for name in vocabulary))
+        beyond = ("find_grid", "layers", "schema", "slab")
+        self.assert_includes("ops/kernels", "ops/kernels/", "vdbdither/model/")
+        for path in sources("ops/kernels"):
+            for name in included(path):
+                self.assertNotIn(pathlib.Path(name).stem, beyond, path)
+
+    def test_every_source_lives_in_a_family(self):
+        for folder in ("vdbdither", "io", "ops/kernels"):
+            self.assertEqual(sources(folder, below=False), [])
+
+    def test_kernel_families_form_no_circle(self):
+        self.assert_no_circle("ops/kernels")
+
+    def test_io_families_form_no_circle(self):
+        self.assert_no_circle("io")
 
     def test_nothing_but_tests_includes_tests(self):
-        for folder in ("vdbdither", "io", "ops", "ops/kernels", "commands"):
+        for folder in ("vdbdither", "io", "ops"):
             for path in sources(folder):
                 self.assertFalse([name for name in included(path) if name.startswith("tests/")], path)
 

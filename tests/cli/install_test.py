@@ -21,7 +21,7 @@ CONSUMER = {
 
         #include "vdbdither/model/lattice.h"
         #include "vdbdither/engine/registry.h"
-        #include "vdbdither/version.h"
+        #include "vdbdither/engine/version.h"
 
         int main() {
           const vdbdither::Lattice lattice{{0.042, 0.084, 0.022}, {}, openvdb::CoordBBox({0, 0, 0}, {9, 9, 9})};

@@ -11,9 +11,9 @@
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/engine/chain.h"
-#include "vdbdither/model/openvdb.h"
 #include "vdbdither/engine/pipeline.h"
 #include "vdbdither/engine/registry.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 namespace {

@@ -29,7 +29,7 @@ Schema schemaOf(const Grids& grids, const CoordBBox& box) {
   Schema schema;
   schema.lattice = {{0.5, 0.25, 2}, {0, 0, 0}, box};
   for (const auto& [name, grid] : grids) schema.grids[name] = grid->copyGridWithNewTree();
-  schema.metadata[std::string(materials_key)] =
+  schema.metadata[materials_key] =
       toJson({{"white", {240, 240, 240, 255}}, {"black", {26, 26, 29, 255}}});
   schema.metadata["vdbdither:history"] = "drawn\nby hand";
   return schema;

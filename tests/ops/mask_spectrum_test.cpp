@@ -10,9 +10,9 @@
 
 #include "tests/support/drawn_grids.h"
 #include "tests/support/scratch_folder.h"
+#include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 namespace {

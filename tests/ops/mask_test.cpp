@@ -9,8 +9,8 @@
 #include <openvdb/openvdb.h>
 
 #include "ops/kernels/mask/void_and_cluster.h"
-#include "vdbdither/model/errors.h"
 #include "vdbdither/engine/registry.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

@@ -6,9 +6,9 @@
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
 #include "tests/support/drawn_grids.h"
-#include "vdbdither/model/errors.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/registry.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {
@@ -61,8 +61,8 @@ std::vector<std::vector<std::string>> drawing(const GridConstPtr& grid, const Co
 
 std::string tableText(Assign assign, const Schema& schema) {
   std::string text;
-  for (const Material& material : materialTableFromJson(
-           assign.filter().plan(schema).metadata.at(std::string(materials_key)))) {
+  for (const Material& material :
+       materialTableFromJson(assign.filter().plan(schema).metadata.at(materials_key))) {
     text += material.name + "=" + std::to_string(material.rgba[0]) + " ";
   }
   return text;

@@ -7,9 +7,9 @@
 
 #include "tests/support/shapes.h"
 #include "tests/support/told.h"
+#include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/operator.h"
 
 namespace vdbdither {
 

@@ -7,9 +7,9 @@
 #include "io/vdb/vdb.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/volumes.h"
-#include "vdbdither/model/errors.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/registry.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {

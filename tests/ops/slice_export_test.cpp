@@ -16,9 +16,9 @@
 #include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/told.h"
-#include "vdbdither/model/errors.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/registry.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 namespace {
@@ -41,7 +41,7 @@ Job jobOf(const openvdb::Int32Grid::Ptr& material, const CoordBBox& box) {
   Job job;
   job.schema.lattice = {{0.042, 0.084, 0.022}, {0, 0, 0}, box};
   job.schema.grids["material"] = openvdb::Int32Grid::create(0);
-  job.schema.metadata[std::string(materials_key)] =
+  job.schema.metadata[materials_key] =
       toJson({{"white", {240, 240, 240, 255}}, {"black", {26, 26, 29, 255}}});
   job.schema.metadata["vdbdither:history"] = "drawn\nby hand";
   job.grids["material"] = material;

@@ -6,17 +6,17 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "io/profile/material_table.h"
-#include "io/image/png_runs.h"
 #include "io/file/staged_output.h"
+#include "io/image/png_runs.h"
+#include "io/profile/material_table.h"
 #include "io/vdb/vdb.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/told.h"
+#include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
-#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 namespace {
@@ -50,7 +50,7 @@ Job job() {
   }
   job.grids["material"] = pruned(material);
   job.schema.grids["material"] = material->copyGridWithNewTree();
-  job.schema.metadata[std::string(materials_key)] = toJson(
+  job.schema.metadata[materials_key] = toJson(
       {{"white", {240, 240, 240, 255}}, {"black", {26, 26, 29, 255}}, {"red", {255, 0, 0, 255}}});
   job.schema.metadata["vdbdither:history"] = "drawn\nby hand";
   return job;
@@ -108,8 +108,7 @@ class SliceImport : public testing::Test {
     EXPECT_EQ(schema.grids.contains("material"), material);
     EXPECT_EQ(schema.metadata.at("vdbdither:history"), "drawn\nby hand");
     if (material) {
-      EXPECT_EQ(schema.metadata.at(std::string(materials_key)),
-                job.schema.metadata.at(std::string(materials_key)));
+      EXPECT_EQ(schema.metadata.at(materials_key), job.schema.metadata.at(materials_key));
     }
     const ZRange layers = schema.lattice.layers();
     for (const int height : {8, 64}) {
@@ -231,7 +230,7 @@ TEST_F(SliceImport, RefusesSlicesOfOtherSizesAndUnknownColours) {
 
 TEST_F(SliceImport, RefusesMaterialsOfOneColourAndVoxelsOfTwoMaterials) {
   Job twins = job();
-  twins.schema.metadata[std::string(materials_key)] =
+  twins.schema.metadata[materials_key] =
       toJson({{"a", {1, 1, 1, 255}}, {"b", {1, 1, 1, 255}}, {"c", {2, 2, 2, 255}}});
   exported(twins, {scratch_ / "twins"});
   EXPECT_THAT(

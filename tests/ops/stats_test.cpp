@@ -32,7 +32,7 @@ Job jobOf(Grids grids, const CoordBBox& box) {
   Job job;
   job.schema.lattice = {pitch_mm, {0, 0, 0}, box};
   for (const auto& [name, grid] : grids) job.schema.grids[name] = grid->copyGridWithNewTree();
-  job.schema.metadata[std::string(materials_key)] =
+  job.schema.metadata[materials_key] =
       toJson({{"white", {240, 240, 240, 255}}, {"black", {26, 26, 29, 255}}});
   job.grids = std::move(grids);
   return job;

@@ -1,9 +1,9 @@
 #include "tests/support/contract.h"
 
 #include "io/vdb/vdb.h"
+#include "vdbdither/engine/window.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/window.h"
 
 namespace vdbdither::test {
 

@@ -37,7 +37,7 @@ Values valuesOf(const Option& option) {
 
 std::vector<Option> optionsOf(const Page& page, const Page& common) {
   std::vector<Option> options(page.options.all().begin(), page.options.all().end());
-  if (page.kind == "command") return options;
+  if (page.kind == "tool") return options;
   for (const Option& option : common.options.all()) {
     if (!page.options.find(option.name)) options.push_back(option);
   }

@@ -5,7 +5,7 @@
 
 #include "vdbdither/engine/registry.h"
 #include "vdbdither/engine/run_options.h"
-#include "vdbdither/version.h"
+#include "vdbdither/engine/version.h"
 
 namespace vdbdither {
 
@@ -93,7 +93,7 @@ std::string markdownPage(const Page& page) {
   std::string text = "# " + page.name + "\n\n" + page.summary + ".\n\n" + whatItIs(page) +
                      "\n\n```\n" + usage(page) + "\n```\n\n";
   if (!page.options.all().empty()) text += markdownOptions(page.options) + "\n";
-  if (page.kind != "command") text += "Besides the [options of every operator](README.md).\n\n";
+  if (page.kind != "tool") text += "Besides the [options of every operator](README.md).\n\n";
   return text + "Example:\n\n    vdbdither " + replaced(page.example, "\n", "\n    vdbdither ") +
          "\n";
 }
@@ -137,7 +137,7 @@ std::string manualPage(const Page& page) {
   std::string text = troffHead("vdbdither-" + page.name, page.summary) + ".SH SYNOPSIS\n.B " +
                      troff(usage(page)) + "\n.SH DESCRIPTION\n" + troff(whatItIs(page)) + "\n";
   if (!page.options.all().empty()) text += ".SH OPTIONS\n" + troffOptions(page.options);
-  if (page.kind != "command") text += ".PP\nOptions of every operator: see\n.BR vdbdither (1).\n";
+  if (page.kind != "tool") text += ".PP\nOptions of every operator: see\n.BR vdbdither (1).\n";
   return text + ".SH EXAMPLE\n.nf\nvdbdither " +
          troff(replaced(page.example, "\n", "\nvdbdither ")) +
          "\n.fi\n.SH SEE ALSO\n.BR vdbdither (1)\n";
@@ -172,10 +172,10 @@ Page pageOf(const OperatorInfo& info) {
   return page;
 }
 
-Page pageOf(const CommandInfo& info) {
-  const std::shared_ptr<Command> made = info.make();
-  Page page{std::string(info.name),    "command", std::string(info.summary),
-            std::string(info.example), {},        made};
+Page pageOf(const ToolInfo& info) {
+  const std::shared_ptr<Tool> made = info.make();
+  Page page{std::string(info.name),    "tool", std::string(info.summary),
+            std::string(info.example), {},     made};
   made->declare(page.options);
   return page;
 }
@@ -190,7 +190,7 @@ Page commonPage() {
 std::vector<Page> pages() {
   std::vector<Page> all;
   for (const OperatorInfo* info : registeredOperators()) all.push_back(pageOf(*info));
-  for (const CommandInfo* info : commands()) {
+  for (const ToolInfo* info : registeredTools()) {
     if (!info->hidden) all.push_back(pageOf(*info));
   }
   std::sort(all.begin(), all.end(), [](const Page& a, const Page& b) { return a.name < b.name; });
@@ -198,7 +198,7 @@ std::vector<Page> pages() {
 }
 
 std::string helpText(const Page& page) {
-  const Page common = page.kind == "command" ? Page{} : commonPage();
+  const Page common = page.kind == "tool" ? Page{} : commonPage();
   return page.options.help(page.name, page.summary, page.example, common.options);
 }
 
@@ -211,7 +211,7 @@ std::string overview() {
   constexpr std::array<std::pair<const char*, const char*>, 4> groups{{{"source", "Sources   "},
                                                                        {"filter", "Filters   "},
                                                                        {"sink", "Sinks     "},
-                                                                       {"command", "Commands  "}}};
+                                                                       {"tool", "Tools     "}}};
   for (const auto& [kind, title] : groups) {
     std::vector<std::string> names;
     for (const Page& page : pages()) {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/engine/command.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/tool.h"
 
 namespace vdbdither {
 
@@ -20,7 +20,7 @@ struct Page {
 };
 
 Page pageOf(const OperatorInfo& info);
-Page pageOf(const CommandInfo& info);
+Page pageOf(const ToolInfo& info);
 
 /// Every operator and every command that is for people, by name.
 std::vector<Page> pages();

@@ -14,17 +14,17 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 
 namespace {
 
-constexpr const char* history_key = "vdbdither:history";
 constexpr const char* source_verb = "read";
 constexpr const char* sink_verb = "write";
 

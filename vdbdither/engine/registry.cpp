@@ -23,4 +23,11 @@ const OperatorInfo& findOperator(std::string_view name) {
   throw UsageError(message);
 }
 
+const ToolInfo* findTool(std::string_view name) {
+  for (const ToolInfo* info : registeredTools()) {
+    if (info->name == name) return info;
+  }
+  return nullptr;
+}
+
 }  // namespace vdbdither

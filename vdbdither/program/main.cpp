@@ -8,17 +8,16 @@
 
 #include <nlohmann/json.hpp>
 
-#include "vdbdither/engine/command.h"
-#include "vdbdither/engine/manual.h"
 #include "io/file/standard_streams.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/chain.h"
-#include "vdbdither/program/console.h"
-#include "vdbdither/model/errors.h"
-#include "vdbdither/model/interrupt.h"
+#include "vdbdither/engine/manual.h"
 #include "vdbdither/engine/pipeline.h"
 #include "vdbdither/engine/registry.h"
-#include "vdbdither/version.h"
+#include "vdbdither/engine/version.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
+#include "vdbdither/program/console.h"
 
 namespace vdbdither {
 namespace {
@@ -26,7 +25,7 @@ namespace {
 /// What `help` says of a verb, or of all.
 std::string helpOn(const std::string& verb) {
   if (verb == "all") return listing();
-  if (const CommandInfo* command = findCommand(verb)) return helpText(pageOf(*command));
+  if (const ToolInfo* tool = findTool(verb)) return helpText(pageOf(*tool));
   return helpText(pageOf(findOperator(verb)));
 }
 
@@ -35,14 +34,14 @@ bool asksForHelp(const std::vector<std::string>& words) {
                      [](const std::string& word) { return word == "--help" || word == "-h"; });
 }
 
-void runCommand(const CommandInfo& info, const std::vector<std::string>& arguments) {
+void runTool(const ToolInfo& info, const std::vector<std::string>& arguments) {
   if (asksForHelp(arguments)) return printData(helpText(pageOf(info)).c_str());
   try {
-    const std::unique_ptr<Command> command = info.make();
+    const std::unique_ptr<Tool> tool = info.make();
     Options options;
-    command->declare(options);
+    tool->declare(options);
     options.parse(arguments);
-    command->run();
+    tool->run();
   } catch (const UsageError& error) {
     throw UsageError(std::string(info.name) + ": " + error.what());
   } catch (const DataError& error) {
@@ -51,14 +50,14 @@ void runCommand(const CommandInfo& info, const std::vector<std::string>& argumen
 }
 
 /// Whether a word that is no operator was rather meant to be a command.
-void refuseNearCommand(const std::string& word) {
+void refuseNearTool(const std::string& word) {
   std::vector<std::string> names;
   for (const OperatorInfo* info : registeredOperators()) names.emplace_back(info->name);
-  for (const CommandInfo* info : commands()) {
+  for (const ToolInfo* info : registeredTools()) {
     if (!info->hidden) names.emplace_back(info->name);
   }
   const std::string near = nearestWord(word, names);
-  if (word != near && findCommand(near))
+  if (word != near && findTool(near))
     throw UsageError("no operator or command '" + word + "'; did you mean '" + near + "'?");
 }
 
@@ -171,9 +170,9 @@ void runProgram(int argc, char** argv) {
   if (words.front() == "--help" || words.front() == "-h" || words.front() == "help") {
     return printData(words.size() > 1 ? helpOn(words[1]).c_str() : overview().c_str());
   }
-  if (const CommandInfo* command = findCommand(words.front()))
-    return runCommand(*command, {words.begin() + 1, words.end()});
-  refuseNearCommand(words.front());
+  if (const ToolInfo* tool = findTool(words.front()))
+    return runTool(*tool, {words.begin() + 1, words.end()});
+  refuseNearTool(words.front());
   runChain(words);
 }
 
@@ -181,7 +180,7 @@ void runProgram(int argc, char** argv) {
 bool namesItsStage(const std::string& message) {
   const std::string first = message.substr(0, message.find(": "));
   const auto operators = registeredOperators();
-  return findCommand(first) || first == "run" ||
+  return findTool(first) || first == "run" ||
          std::any_of(operators.begin(), operators.end(),
                      [&](const OperatorInfo* info) { return first == info->name; });
 }

@@ -9,12 +9,13 @@
 
 #include "ops/kernels/contour/iso_surface.h"
 #include "vdbdither/model/grid.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
 /// The grids that have a surface as it is printed or meant, the furthest down a chain first.
-inline constexpr std::array<std::string_view, 4> surface_grids{"printed", "solid", "displaced",
-                                                               "surface"};
+inline constexpr std::array<std::string_view, 4> surface_grids{printed_grid, solid_grid,
+                                                               displaced_grid, surface_grid};
 
 /// `wanted` itself, or of "auto" the first of `surface_grids` that `there` holds. Throws DataError
 /// where it is not there.

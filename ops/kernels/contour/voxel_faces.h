@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "ops/kernels/leaf/bit_layers.h"
 #include "ops/kernels/contour/iso_surface.h"
+#include "ops/kernels/leaf/bit_layers.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {

@@ -12,6 +12,7 @@
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/surface_leaves.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -106,7 +107,7 @@ Int32Grid::Ptr unitedParts(const FloatGrid& a, const FloatGrid& b, const Int32Gr
                            const Int32Grid* b_parts, int shift, bool b_first, ZRange core) {
   using IntLeaf = openvdb::Int32Tree::LeafNodeType;
   auto grid = Int32Grid::create(0);
-  grid->setName("part");
+  grid->setName(part_grid);
   grid->setTransform(a.transform().copy());
 
   // Where either has a leaf of distances or of parts, voxels are decided one by one.

@@ -1,5 +1,7 @@
 #include "ops/kernels/distance/gradient.h"
 
+#include "vdbdither/model/known_grids.h"
+
 #ifdef __SSE2__
 #include <emmintrin.h>
 #endif
@@ -80,7 +82,7 @@ LeafNormals::Row LeafNormals::row(unsigned offset) const {
 
 openvdb::Vec3SGrid::Ptr makeNormalGrid(const openvdb::math::Transform& transform) {
   auto grid = openvdb::Vec3SGrid::create(Vec3s(0.0F));
-  grid->setName("N");
+  grid->setName(normal_grid);
   grid->setVectorType(openvdb::VEC_COVARIANT_NORMALIZE);
   grid->setTransform(transform.copy());
   return grid;

@@ -20,6 +20,7 @@
 
 #include "ops/kernels/distance/leaf_distances.h"
 #include "ops/kernels/distance/row_crossings.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -642,15 +643,15 @@ DistanceGrids MeshDistance::run(ZRange core) const {
     grid->setTransform(transformOf(lattice_));
     return grid;
   };
-  grids.surface = dress(openvdb::FloatGrid::create(static_cast<float>(backgroundMm())), "surface",
-                        openvdb::GRID_LEVEL_SET);
+  grids.surface = dress(openvdb::FloatGrid::create(static_cast<float>(backgroundMm())),
+                        surface_grid, openvdb::GRID_LEVEL_SET);
   if (extras_.normals) {
-    grids.normals =
-        dress(openvdb::Vec3SGrid::create(openvdb::Vec3s(0, 0, 0)), "N", openvdb::GRID_UNKNOWN);
+    grids.normals = dress(openvdb::Vec3SGrid::create(openvdb::Vec3s(0, 0, 0)), normal_grid,
+                          openvdb::GRID_UNKNOWN);
     grids.normals->setVectorType(openvdb::VEC_COVARIANT_NORMALIZE);
   }
   if (extras_.closest)
-    grids.closest = dress(openvdb::Int32Grid::create(-1), "closest", openvdb::GRID_UNKNOWN);
+    grids.closest = dress(openvdb::Int32Grid::create(-1), closest_grid, openvdb::GRID_UNKNOWN);
 
   if (lattice_.box.empty()) return grids;
   const ZRange layers = intersection(core, lattice_.layers());

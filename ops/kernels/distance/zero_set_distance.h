@@ -3,8 +3,8 @@
 #include <memory>
 #include <mutex>
 
-#include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/contour/zero_set.h"
+#include "ops/kernels/distance/mesh_distance.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {

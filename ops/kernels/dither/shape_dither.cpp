@@ -12,10 +12,11 @@
 
 #include "ops/kernels/distance/closest_surface_voxel.h"
 #include "ops/kernels/distance/gradient.h"
-#include "ops/kernels/leaf/leaf_bits.h"
-#include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/dither/voxel_diameter.h"
 #include "ops/kernels/dither/wall_guard.h"
+#include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/solid.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -246,7 +247,7 @@ struct Nowhere {
 
 openvdb::FloatGrid::Ptr makeDisplacedGrid(const openvdb::FloatGrid& surface) {
   auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(surface.copyGridWithNewTree());
-  grid->setName("displaced");
+  grid->setName(displaced_grid);
   grid->setTransform(surface.transform().copy());
   return grid;
 }

@@ -6,6 +6,8 @@
 #include <openvdb/tools/Prune.h>
 #include <tbb/parallel_for.h>
 
+#include "vdbdither/model/known_grids.h"
+
 namespace vdbdither {
 
 using openvdb::Coord;
@@ -61,7 +63,7 @@ void fillLeaf(Leaf& leaf, std::vector<Accessor>& surfaces) {
 
 openvdb::Int32Grid::Ptr partIndex(std::span<const FloatGrid::ConstPtr> surfaces) {
   auto grid = openvdb::Int32Grid::create(0);
-  grid->setName("part");
+  grid->setName(part_grid);
   grid->insertMeta(part_count_key,
                    openvdb::Int32Metadata(static_cast<std::int32_t>(surfaces.size())));
   Int32Tree& parts = grid->tree();

@@ -2,12 +2,10 @@
 
 #include <span>
 
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
-
-/// Metadata of a grid `part`: the greatest number that its voxels may have.
-inline constexpr const char* part_count_key = "vdbdither:parts";
 
 /// Which part a voxel belongs to, from 1: the first of `surfaces` that holds it (d < 0, tiles and
 /// inactive voxels too), or where none does but some are near, the nearest. 0 elsewhere.

@@ -4,6 +4,8 @@
 
 #include <openvdb/tools/Prune.h>
 
+#include "vdbdither/model/known_grids.h"
+
 namespace vdbdither {
 
 using openvdb::Coord;
@@ -61,7 +63,7 @@ std::vector<CoordBBox> insideTiles(const openvdb::FloatTree& surface, ZRange lay
 
 openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform) {
   auto grid = openvdb::BoolGrid::create(false);
-  grid->setName("solid");
+  grid->setName(solid_grid);
   grid->setTransform(transform.copy());
   return grid;
 }

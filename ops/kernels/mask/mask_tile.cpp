@@ -1,5 +1,6 @@
 #include "ops/kernels/mask/mask_tile.h"
 
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
@@ -28,7 +29,7 @@ std::string nameOf(MaskKernel::Shape shape) {
 
 FloatGrid::Ptr emptyMask(const Coord& size, const std::string& kind) {
   FloatGrid::Ptr grid = FloatGrid::create(0.0f);
-  grid->setName("mask");
+  grid->setName(mask_grid);
   grid->insertMeta(size_key, openvdb::Vec3IMetadata(size.asVec3i()));
   grid->insertMeta("mask:kind", openvdb::StringMetadata(kind));
   return grid;

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "ops/kernels/mesh/closest_point.h"
 #include "ops/kernels/measure/surface_error.h"
+#include "ops/kernels/mesh/closest_point.h"
 
 namespace vdbdither {
 

@@ -104,23 +104,6 @@ SurfaceErrors surfaceErrors(const Mesh& surface, const ClosestPoints& reference,
   return errors;
 }
 
-double areaOf(const Mesh& mesh) {
-  double sum = 0;
-  for (const Mesh::Triangle& t : mesh.triangles) {
-    const Vec3d& a = mesh.vertices[t[0]];
-    sum += 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a).length();
-  }
-  return sum;
-}
-
-double volumeOf(const Mesh& mesh) {
-  // From a corner of the mesh, so that a far origin costs no digits.
-  const Vec3d from = mesh.vertices.empty() ? Vec3d(0.0) : mesh.vertices.front();
-  double sum = 0;
-  for (const Mesh::Triangle& t : mesh.triangles) sum += volumeFrom(from, mesh, t);
-  return sum;
-}
-
 double ErrorStatistics::percentile(double percent) const {
   return quantiles_mm[static_cast<std::size_t>(std::lround(percent / 100 * steps))];
 }

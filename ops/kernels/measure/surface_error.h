@@ -29,17 +29,6 @@ struct SurfaceErrors {
 SurfaceErrors surfaceErrors(const Mesh& surface, const ClosestPoints& reference, double spacing_mm,
                             const std::function<void(double)>& progress = {});
 
-double areaOf(const Mesh& mesh);    ///< mm²
-double volumeOf(const Mesh& mesh);  ///< mm³ enclosed; positive where the mesh faces outwards
-
-/// What one triangle adds to that: mm³ between it and the point `from`, the same for all.
-inline double volumeFrom(const openvdb::Vec3d& from, const Mesh& mesh, const Mesh::Triangle& t) {
-  const openvdb::Vec3d a = mesh.vertices[t[0]] - from;
-  const openvdb::Vec3d b = mesh.vertices[t[1]] - from;
-  const openvdb::Vec3d c = mesh.vertices[t[2]] - from;
-  return a.dot(b.cross(c)) / 6;
-}
-
 /// What a set of errors comes to.
 struct ErrorStatistics {
   double weight = 0;  ///< area in mm², or the count of points

@@ -17,7 +17,7 @@
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/mesh/mesh_edges.h"
-#include "ops/kernels/measure/surface_error.h"
+#include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/winding_number.h"
 
 namespace vdbdither {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "ops/kernels/mesh/mesh_measures.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -31,15 +32,6 @@ void rotate(Mesh& mesh, const Vec3d& degrees) {
 }
 
 }  // namespace
-
-MeshBounds boundsOf(const Mesh& mesh) {
-  MeshBounds bounds{mesh.vertices.front(), mesh.vertices.front()};
-  for (const Vec3d& vertex : mesh.vertices) {
-    bounds.min = openvdb::math::minComponent(bounds.min, vertex);
-    bounds.max = openvdb::math::maxComponent(bounds.max, vertex);
-  }
-  return bounds;
-}
 
 Mesh joined(std::vector<Mesh> meshes) {
   if (meshes.empty()) return {};

@@ -11,12 +11,6 @@
 
 namespace vdbdither {
 
-/// The bounding box of a mesh.
-struct MeshBounds {
-  openvdb::Vec3d min, max;
-};
-MeshBounds boundsOf(const Mesh& mesh);
-
 /// `meshes` in one, one after the other.
 Mesh joined(std::vector<Mesh> meshes);
 

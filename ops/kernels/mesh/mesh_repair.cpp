@@ -15,7 +15,7 @@
 
 #include "ops/kernels/mesh/hole_filling.h"
 #include "ops/kernels/mesh/mesh_edges.h"
-#include "ops/kernels/measure/surface_error.h"
+#include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/winding_number.h"
 
 namespace vdbdither {

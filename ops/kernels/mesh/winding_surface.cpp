@@ -24,9 +24,9 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include "ops/kernels/mesh/grid_keys.h"
 #include "ops/kernels/contour/marching_cubes.h"
-#include "ops/kernels/measure/surface_error.h"
+#include "ops/kernels/mesh/grid_keys.h"
+#include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/triangle_and_cube.h"
 #include "ops/kernels/mesh/winding_cells.h"
 #include "vdbdither/model/openvdb.h"

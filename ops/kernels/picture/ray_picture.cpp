@@ -10,6 +10,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "vdbdither/model/errors.h"
 

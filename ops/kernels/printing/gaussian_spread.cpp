@@ -11,6 +11,7 @@
 #include "ops/kernels/leaf/bit_layers.h"
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/printing/normal_distribution.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -297,7 +298,7 @@ FloatGrid::Ptr GaussianSpread::run(const openvdb::BoolGrid& solid, const CoordBB
 
 FloatGrid::Ptr makePrintedGrid(const openvdb::math::Transform& transform) {
   auto grid = FloatGrid::create(0.0F);
-  grid->setName("printed");
+  grid->setName(printed_grid);
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
   grid->setTransform(transform.copy());
   return grid;

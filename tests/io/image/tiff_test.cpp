@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/image/png_runs.h"
 #include "io/file/staged_output.h"
+#include "io/image/png_runs.h"
 #include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"

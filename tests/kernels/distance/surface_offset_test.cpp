@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/dither/shape_dither.h"
+#include "ops/kernels/leaf/held_band.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/volumes.h"
 #include "vdbdither/model/errors.h"

@@ -6,6 +6,7 @@
 #include <tbb/global_control.h>
 
 #include "ops/kernels/measure/axis_errors.h"
+#include "ops/kernels/mesh/mesh_measures.h"
 #include "tests/support/shapes.h"
 
 namespace vdbdither {
