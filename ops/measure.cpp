@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file/staged_output.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/mesh/mesh_writer.h"
 #include "ops/kernels/contour/grid_surface.h"
@@ -30,6 +31,11 @@ namespace vdbdither {
 namespace {
 
 using nlohmann::ordered_json;
+
+/// The endings of the mesh files that hold the error of each vertex.
+std::string colouredEndings() {
+  return meshEndings([](const MeshFormat& format) { return format.holds_extras; });
+}
 
 ordered_json json(const ErrorStatistics& statistics) {
   ordered_json result{{"weight", statistics.weight},         {"bias_mm", statistics.bias_mm},
@@ -130,9 +136,9 @@ std::string plainText(const ordered_json& all) {
 class Measure : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("mesh", file_,
-                       "A mesh to measure in place of what comes down a chain: STL, OBJ or PLY",
-                       false);
+    options.positional(
+        "mesh", file_,
+        "A mesh to measure in place of what comes down a chain: " + meshFormatNames(), false);
     options.text("reference", reference_file_, "FILE", "The mesh that it should be");
     options.choice("unit", unit_, {"mm", "cm", "m", "in", "um"},
                    "What the reference's numbers mean");
@@ -156,7 +162,8 @@ class Measure : public Sink {
     options.length("margin", rules_.margin_mm,
                    "Roughness leaves out what is nearer than this to an edge of a facet");
     options.text("report", report_file_, "FILE.json", "Writes all figures to a file");
-    options.text("map", map_file_, "FILE.ply", "Writes the mesh, coloured by its error");
+    options.text("map", map_file_, "FILE",
+                 "Writes the mesh, coloured by its error, into a " + colouredEndings() + " file");
     options.length("map-range", map_range_mm_,
                    "The error of the map's last colours; 0 takes the 99th percentile");
     options.flag("json", json_, "Prints all figures, as JSON");
@@ -175,8 +182,10 @@ class Measure : public Sink {
     if (!report_file_.empty())
       StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_);
     if (!map_file_.empty()) {
-      if (!map_file_.ends_with(".ply"))
-        throw UsageError("--map: '" + map_file_ + "' is no .ply, which alone holds colours");
+      const MeshFormat* format = meshFormatNamedBy(map_file_);
+      if (format == nullptr || !format->holds_extras)
+        throw UsageError("--map: '" + map_file_ + "' cannot hold colours; name a " +
+                         colouredEndings() + " file");
       MeshWriter::check(map_file_, overwrite_);
     }
     if (!standsAlone()) {

@@ -10,6 +10,7 @@
 #include "io/image/exr.h"
 #include "io/image/picture.h"
 #include "io/image/png_runs.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/contour/voxel_faces.h"
@@ -38,7 +39,8 @@ class Render : public Sink {
   void declare(Options& options) override {
     options.positionals("files", files_,
                         "The .png or .exr to write; before it, a mesh to draw in place of what "
-                        "comes down a chain: STL, OBJ or PLY");
+                        "comes down a chain: " +
+                            meshFormatNames());
     options.text("grid", grid_, "NAME",
                  "Whose surface comes down the chain: of solid its voxels, of printed, displaced "
                  "and surface a level; auto takes the furthest down the chain");
