@@ -26,7 +26,9 @@ function(generate_table table symbols)
     string(APPEND declarations "extern const ${of_TYPE} ${symbol};\n")
     string(APPEND entries "      &${symbol},\n")
   endforeach()
-  set(output ${CMAKE_BINARY_DIR}/generated/${of_FUNCTION}.cpp)
+  string(REGEX REPLACE "([A-Z])" "_\\1" name ${of_FUNCTION})
+  string(TOLOWER ${name} name)
+  set(output ${CMAKE_BINARY_DIR}/generated/${name}.cpp)
   file(CONFIGURE OUTPUT ${output} @ONLY CONTENT
 "#include \"@of_HEADER@\"
 
