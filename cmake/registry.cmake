@@ -18,7 +18,10 @@ function(generate_table table symbols)
     endif()
     list(APPEND found ${symbol})
   endforeach()
+  # In the order of the names that users see, in which words are joined by '-'.
+  list(TRANSFORM found REPLACE "_" "-")
   list(SORT found)
+  list(TRANSFORM found REPLACE "-" "_")
 
   set(declarations "")
   set(entries "")
