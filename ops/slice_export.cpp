@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -18,6 +19,7 @@
 #include "io/stack/stack_files.h"
 #include "io/stack/stack_preview.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/engine/version.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
@@ -34,6 +36,13 @@ using nlohmann::ordered_json;
 std::uint32_t pixel(const std::array<std::uint8_t, 4>& colour) {
   return rgba(colour[0], colour[1], colour[2], colour[3]);
 }
+
+constexpr std::array<Choice<ExrPacking>, 5> packings{
+    {{ExrPacking::none, "none", "Uncompressed"},
+     {ExrPacking::rle, "rle", "Run lengths of each row"},
+     {ExrPacking::zips, "zips", "Deflate of each row"},
+     {ExrPacking::zip, "zip", "Deflate of 16 rows together"},
+     {ExrPacking::piz, "piz", "Wavelets of 32 rows together"}}};
 
 /// A file of the stack, by its place in it.
 struct SliceFile {
@@ -54,32 +63,31 @@ struct LayerOutput {
 class SliceExport : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("folder", folder_,
-                       "Folder that will hold the stack, or a zip archive: NAME.zip");
-    options.choice(
-        "format", format_, {"png", "png1", "png8", "tiff", "tiff1", "exr"},
-        "png: 32-bit RGBA in the colours of the materials. png1, tiff1: a stack of 1 bit "
-        "a voxel for each material, in a folder of its own. png8: grey, 255 where "
-        "printed, else 0. tiff: a palette of the colours. exr: material index, and "
-        "distance and normal where they are there");
-    options.text("prefix", prefix_, "TEXT", "What the file names begin with");
-    options.integer("digits", digits_, 1, 9, "Digits of the running number, zeros in front");
-    options.integer("first", first_, 0, 1000000, "Number of the lowest layer");
-    options.integer("padding", padding_, 0, 100000, "Empty voxels added on each side in x and y");
-    options.flag("flip-x", flip_x_,
-                 "Mirror left to right. By default a slice is seen from above: x to the right");
+    options.positional("folder", folder_, "Folder for the stack, or a zip archive: NAME.zip");
+    options.choice("format", format_,
+                   {{"png", "32-bit RGBA in the colours of the materials"},
+                    {"png1", "For each material a folder of slices with 1 bit per voxel"},
+                    {"png8", "Grey: 255 where printed, else 0"},
+                    {"tiff", "A palette of the colours of the materials"},
+                    {"tiff1", "As png1, in TIFF"},
+                    {"exr", "Material index, and distance and normal where there are any"}},
+                   "Format of the slices");
+    options.text("prefix", prefix_, "TEXT", "Beginning of the file names");
+    options.integer("digits", digits_, {1, 9},
+                    "Digits of the number of a slice, with zeros in front");
+    options.integer("first", first_, {0, 1000000}, "Number of the lowest layer");
+    options.integer("padding", padding_, {0, 100000}, "Empty voxels added on each side in x and y");
+    options.flag(
+        "flip-x", flip_x_,
+        "Mirrors left to right; by default a slice is seen from above, with x to the right");
     options.flag("flip-y", flip_y_,
-                 "Mirror top to bottom. By default a slice is seen from above: the top row has the "
-                 "greatest y");
+                 "Mirrors top to bottom; by default the maximum y is the top row");
     options.text("background", background_, "COLOUR",
-                 "Colour of what is not printed, in png and tiff: #rrggbb, or r,g,b,a of 0 to 255");
-    options.choice(
-        "exr-packing", exr_packing_, {"none", "rle", "zips", "zip", "piz"},
-        "How exr is packed, always without loss: zips and rle by rows, zip by 16 and piz "
-        "by 32 of them");
-    options.integer("exr-tile", exr_tile_, 0, 4096, "Edge of the tiles of exr; 0 makes rows");
-    options.flag("exr-half", exr_half_, "Distances in exr take 16 bits in place of 32");
-    options.flag("overwrite", overwrite_, "Replace a stack that is there already");
+                 "Colour of empty voxels in png and tiff: #rrggbb, or r,g,b,a from 0 to 255");
+    options.choice("exr-packing", exr_packing_, packings, "Lossless compression of exr");
+    options.integer("exr-tile", exr_tile_, {0, 4096}, "Edge of the tiles of exr; 0 stores rows");
+    options.flag("exr-half", exr_half_, "Stores the distances of exr in 16 bits, not 32");
+    overwrite_.declare(options, "the stack");
   }
 
   void plan(const Schema& in) override {
@@ -93,7 +101,7 @@ class SliceExport : public Sink {
                        std::to_string(materials_.size()) + "; take exr");
     if (prefix_.find('/') != std::string::npos)
       throw UsageError("--prefix: '" + prefix_ + "' must not hold a '/'");
-    StackOutput::check(folder_, overwrite_);
+    StackOutput::check(folder_, overwrite_.overwrite);
     frame_ = {in.lattice.box, padding_, flip_x_, flip_y_};
     if (in.lattice.box.dim().x() + std::int64_t{2} * padding_ > 1 << 24 ||
         in.lattice.box.dim().y() + std::int64_t{2} * padding_ > 1 << 24) {
@@ -358,12 +366,7 @@ class SliceExport : public Sink {
       }
     };
     const ExrFormat format{schema_.lattice.pitch_mm.x() / schema_.lattice.pitch_mm.y(),
-                           exr_packing_ == "none"   ? ExrPacking::none
-                           : exr_packing_ == "rle"  ? ExrPacking::rle
-                           : exr_packing_ == "zips" ? ExrPacking::zips
-                           : exr_packing_ == "zip"  ? ExrPacking::zip
-                                                    : ExrPacking::piz,
-                           exr_tile_};
+                           exr_packing_, exr_tile_};
     return encodeExr(frame_.width(), frame_.height(), format, channels_, fill);
   }
 
@@ -435,10 +438,10 @@ class SliceExport : public Sink {
   bool flip_x_ = false;
   bool flip_y_ = false;
   std::string background_ = "0,0,0,255";
-  std::string exr_packing_ = "zips";
+  ExrPacking exr_packing_ = ExrPacking::zips;
   int exr_tile_ = 0;
   bool exr_half_ = false;
-  bool overwrite_ = false;
+  OverwriteOption overwrite_;
 
   Schema schema_;
   SliceFrame frame_;
