@@ -85,8 +85,8 @@ class Mask : public Source {
     schema.lattice.box = openvdb::CoordBBox(Coord(0, 0, 0), size.offsetBy(-1));
     schema.grids[mask_grid] = emptyGrid();
     const auto leaves = [](int voxels) { return (voxels + leaf_layers - 1) / leaf_layers; };
-    schema.leaves_per_row = leaves(size.x()) * leaves(size.y());
-    schema.leaves = schema.surface_leaves = schema.leaves_per_row * leaves(size.z());
+    const double row = leaves(size.x()) * leaves(size.y());
+    schema.footprint = {row, row * leaves(size.z()), row * leaves(size.z())};
     return schema;
   }
 
@@ -101,10 +101,12 @@ class Mask : public Source {
   [[nodiscard]] std::optional<Work> work() const override {
     const Coord size = tileSize();
     const double voxels = static_cast<double>(size.x()) * size.y() * size.z();
-    if (kind_ == "void-and-cluster")
-      return Work{.seconds = voidAndClusterSeconds(settings()) + 2e-8 * voxels};
-    const double us_per_voxel = kind_ == "gradient-noise" ? 0.3 : 0.025;
-    return Work{.seconds = 1e-6 * us_per_voxel * voxels};
+    const double search_seconds =
+        kind_ == "void-and-cluster" ? voidAndClusterSeconds(settings()) : 0;
+    const double us_per_voxel = kind_ == "void-and-cluster" ? cost::mask_void_and_cluster_us
+                                : kind_ == "gradient-noise" ? cost::mask_gradient_noise_us
+                                                            : cost::mask_us;
+    return Work{.seconds = search_seconds + 1e-6 * us_per_voxel * voxels};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {

@@ -39,13 +39,15 @@ class MeshExport : public Sink {
     if (!level_.empty()) level = parseLengthMm(level_);
     surface_.emplace(in.lattice, *in.grids.at(name_), level);
     MeshWriter::check(file_, overwrite_);
-    leaves_ = in.surface_leaves;
+    leaves_ = in.footprint.at_surface;
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    const double writing = file_.ends_with(".obj") ? 0.55 : 0.2;
-    const double smoothing = smooth_ == "none" ? 0 : taubin_.usPerVertex();
-    return Work{.us_per_leaf = GridSurface::vertices_per_leaf * (0.1 + writing + smoothing)};
+    const double writing =
+        file_.ends_with(".obj") ? cost::mesh_export_text_us : cost::mesh_export_binary_us;
+    const double smoothing = smooth_ == "none" ? 0 : cost::smoothingUs(taubin_.iterations);
+    return Work{.us_per_surface_leaf =
+                    GridSurface::vertices_per_leaf * (cost::mesh_export_us + writing + smoothing)};
   }
 
   [[nodiscard]] OutputEstimate output() const override {

@@ -84,15 +84,12 @@ class LayerTally {
 class Stats : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", path_, "The .vdb to measure; nothing: what comes to it", false);
     options.text("histogram", histogram_grid_, "GRID",
                  "Counts the active values of this grid of numbers in bins");
     options.integer("bins", bins_, 2, 65536,
                     "Bins at most; their edges are multiples of a power of two");
     options.flag("json", json_, "Say it as JSON");
   }
-
-  [[nodiscard]] std::string inputFile() const override { return path_; }
 
   void plan(const Schema& in) override {
     lattice_ = in.lattice;
@@ -126,7 +123,9 @@ class Stats : public Sink {
     return names;
   }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 14}; }
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_surface_leaf = cost::stats_us};
+  }
 
   void write(const Slab& in) override {
     const SliceFrame frame{lattice_.box, 0, false, false};
@@ -282,7 +281,6 @@ class Stats : public Sink {
     return text;
   }
 
-  std::string path_;
   std::string histogram_grid_;
   int bins_ = 32;
   bool json_ = false;
