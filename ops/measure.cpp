@@ -373,7 +373,6 @@ class MeasureMesh : public Tool {
     measurement_.begin(report());
     Mesh mesh = readMesh(file_, [this](const std::string& text) { report().warn(text); });
     if (measurement_.smooths()) checkClosed(mesh);
-    if (mesh.triangles.empty()) throw DataError("'" + file_ + "' has no triangles");
     measurement_.finish(std::move(mesh), file_, nullptr, nullptr, report());
   }
 

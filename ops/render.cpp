@@ -247,7 +247,6 @@ class RenderMesh : public Tool {
     picture_.begin(report());
     if (picture_.drawsBlocks()) throw UsageError("--blocks: a mesh has no voxels");
     Mesh mesh = readMeshOf(file_, report());
-    if (mesh.triangles.empty()) throw DataError("'" + file_ + "' has no triangles");
     picture_.finish(std::move(mesh), report());
   }
 

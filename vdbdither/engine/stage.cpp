@@ -17,11 +17,11 @@ StagePlan Stage::plan(const Schema& in) {
   return callNamed(name(), [&] {
     StagePlan plan;
     plan.name = info_.name;
-    plan.arguments = options_.canonical();
     plan.kind = source()   ? StagePlan::Kind::source
                 : filter() ? StagePlan::Kind::filter
                            : StagePlan::Kind::sink;
     plan.schema = planOperator(in, plan.reads);
+    plan.arguments = options_.canonical();  // now, as the operator may have resolved values
     addHistory(plan.schema);
     plan.is_barrier = operator_->isBarrier() || widest(plan.reads).whole;
     plan.memory_bytes = operator_->memoryBytes();
