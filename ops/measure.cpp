@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file/staged_output.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/mesh/mesh_writer.h"
 #include "ops/kernels/contour/grid_surface.h"
@@ -30,6 +31,11 @@ namespace vdbdither {
 namespace {
 
 using nlohmann::ordered_json;
+
+/// The endings of the mesh files that hold the error of each vertex.
+std::string colouredEndings() {
+  return meshEndings([](const MeshFormat& format) { return format.holds_extras; });
+}
 
 ordered_json json(const ErrorStatistics& statistics) {
   ordered_json result{{"weight", statistics.weight},         {"bias_mm", statistics.bias_mm},
@@ -153,7 +159,8 @@ class SurfaceMeasurement {
     options.length("margin", rules_.margin_mm,
                    "Roughness leaves out what is nearer than this to an edge of a facet");
     options.text("report", report_file_, "FILE.json", "Writes all figures to a file");
-    options.text("map", map_file_, "FILE.ply", "Writes the mesh, coloured by its error");
+    options.text("map", map_file_, "FILE",
+                 "Writes the mesh, coloured by its error, into a " + colouredEndings() + " file");
     options.length("map-range", map_range_mm_,
                    "The error of the map's last colours; 0 takes the 99th percentile");
     options.flag("json", json_, "Prints all figures, as JSON");
@@ -171,8 +178,10 @@ class SurfaceMeasurement {
     if (!report_file_.empty())
       StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_);
     if (!map_file_.empty()) {
-      if (!map_file_.ends_with(".ply"))
-        throw UsageError("--map: '" + map_file_ + "' is no .ply, which alone holds colours");
+      const MeshFormat* format = meshFormatNamedBy(map_file_);
+      if (format == nullptr || !format->holds_extras)
+        throw UsageError("--map: '" + map_file_ + "' cannot hold colours; name a " +
+                         colouredEndings() + " file");
       MeshWriter::check(map_file_, overwrite_);
     }
     readReference(reporter);
@@ -364,8 +373,8 @@ class MeasureMesh : public Tool {
   static bool takes(const std::string& file) { return !file.ends_with(".vdb"); }
 
   void declare(Options& options) override {
-    options.positional("mesh", file_, "A mesh to measure, if there is no chain: STL, OBJ or PLY",
-                       false);
+    options.positional("mesh", file_,
+                       "A mesh to measure, if there is no chain: " + meshFormatNames(), false);
     measurement_.declare(options);
   }
 

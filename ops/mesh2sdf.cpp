@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/profile/printer_profile.h"
 #include "io/profile/target_lattice.h"
@@ -26,9 +27,9 @@ using openvdb::Vec3d;
 class MeshToSdf : public Source {
  public:
   void declare(Options& options) override {
-    options.positionals(
-        "mesh", paths_,
-        "Mesh files: STL, OBJ or PLY; several are printed as one, and 'part' tells them apart");
+    options.positionals("mesh", paths_,
+                        "Mesh files: " + meshFormatNames() +
+                            "; several are printed as one, and 'part' tells them apart");
     options.text("printer", printer_, "NAME|FILE.json", "The printer whose lattice to use");
     options.text("pitch", pitch_, "DX,DY,DZ", "The lattice's pitch, in place of a printer's");
     options.choice("unit", unit_, {"mm", "cm", "m", "in", "um"}, "What the mesh's numbers mean");

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_writer.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/mesh/taubin.h"
@@ -17,7 +18,7 @@ namespace {
 class MeshExport : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", file_, "The .stl, .obj or .ply to write");
+    options.positional("file", file_, "The " + meshEndings() + " to write");
     options.text("grid", grid_, "NAME",
                  "Whose surface: of solid its voxels, of surface and displaced a level of the "
                  "distance, of printed a level of the occupancy; auto takes the furthest down the "
@@ -43,16 +44,14 @@ class MeshExport : public Sink {
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    const double writing =
-        file_.ends_with(".obj") ? cost::mesh_export_text_us : cost::mesh_export_binary_us;
+    const double writing = meshFormatNamedBy(file_)->us_per_vertex;
     const double smoothing = smooth_ == "none" ? 0 : cost::smoothingUs(taubin_.iterations);
     return Work{.us_per_surface_leaf =
                     GridSurface::vertices_per_leaf * (cost::mesh_export_us + writing + smoothing)};
   }
 
   [[nodiscard]] OutputEstimate output() const override {
-    // Two triangles for a vertex: 50 bytes each, or 13 and the vertex 12, or lines of text.
-    const double per_vertex = file_.ends_with(".stl") ? 100 : file_.ends_with(".ply") ? 38 : 74;
+    const double per_vertex = meshFormatNamedBy(file_)->bytes_per_vertex;
     return {file_, leaves_ * GridSurface::vertices_per_leaf * per_vertex};
   }
 
@@ -112,7 +111,7 @@ class MeshExport : public Sink {
 
 extern const OperatorInfo mesh_export;
 const OperatorInfo mesh_export{
-    "mesh-export", "The surface of a grid as a closed triangle mesh: STL, OBJ or PLY",
+    "mesh-export", "The surface of a grid as a closed triangle mesh",
     "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! mesh-export printed.stl",
     []() -> std::unique_ptr<Operator> { return std::make_unique<MeshExport>(); }};
 

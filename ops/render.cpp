@@ -10,6 +10,7 @@
 #include "io/image/exr.h"
 #include "io/image/picture.h"
 #include "io/image/png_runs.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/contour/voxel_faces.h"
@@ -238,7 +239,7 @@ class RenderMesh : public Tool {
   static bool takes(const std::string& file) { return !file.ends_with(".vdb"); }
 
   void declare(Options& options) override {
-    options.positional("mesh", file_, "A mesh to draw, if there is no chain: STL, OBJ or PLY",
+    options.positional("mesh", file_, "A mesh to draw, if there is no chain: " + meshFormatNames(),
                        false);
     picture_.declare(options);
   }

@@ -45,9 +45,7 @@ class Measure : public testing::Test {
   void SetUp() override { save(test::boxMesh({0, 0, 0}, {2, 2, 1}), "part.stl"); }
 
   void save(const Mesh& mesh, const std::string& name) const {
-    const std::string bytes = test::binaryStl(mesh);
-    std::ofstream(scratch / name, std::ios::binary)
-        .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    scratch.write(name, test::binaryStl(mesh));
   }
   [[nodiscard]] std::string file(const std::string& name) const { return scratch / name; }
 
@@ -163,8 +161,9 @@ TEST_F(Measure, RefusesWhatCannotBeMeasured) {
                   "--reference is missing: name the mesh that the surface should be"));
   EXPECT_THAT(plan({file("part.stl"), "--reference", file("none.stl")}),
               ThrowsMessage<DataError>(HasSubstr("no such file")));
-  EXPECT_THAT(plan({file("part.stl"), "--reference", file("part.stl"), "--map", "map.stl"}),
-              ThrowsMessage<UsageError>("--map: 'map.stl' is no .ply, which alone holds colours"));
+  EXPECT_THAT(
+      plan({file("part.stl"), "--reference", file("part.stl"), "--map", "map.stl"}),
+      ThrowsMessage<UsageError>(HasSubstr("--map: 'map.stl' cannot hold colours; name a .ply")));
   EXPECT_THAT(plan({file("part.stl"), "--reference", file("part.stl"), "--spacing", "0"}),
               ThrowsMessage<UsageError>("--spacing: 0 mm is no length to look at"));
   EXPECT_THAT(

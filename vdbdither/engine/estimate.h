@@ -63,9 +63,7 @@ inline constexpr double write_us_per_byte = 4e-3;
 // Microseconds for each vertex of a surface.
 inline constexpr double measure_us = 0.3;
 inline constexpr double measure_us_per_point = 1.3;
-inline constexpr double mesh_export_us = 0.1;
-inline constexpr double mesh_export_binary_us = 0.2;
-inline constexpr double mesh_export_text_us = 0.55;
+inline constexpr double mesh_export_us = 0.1;  ///< besides writing, which is up to the format
 inline constexpr double render_us = 1.4;
 constexpr double smoothingUs(int iterations) { return 0.25 + 0.022 * iterations; }
 
