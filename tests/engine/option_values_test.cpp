@@ -52,13 +52,6 @@ TEST(OptionValues, RangesAreToldInWords) {
   EXPECT_EQ(Range::above(0, 5).text(), "greater than 0, up to 5");
 }
 
-TEST(OptionValues, AlternativesReadAsASentence) {
-  using Words = std::vector<std::string>;
-  EXPECT_EQ(alternatives(Words{"a"}), "a");
-  EXPECT_EQ(alternatives(Words{"a", "b"}), "a or b");
-  EXPECT_EQ(alternatives(Words{"a", "b", "c"}), "a, b or c");
-}
-
 TEST(OptionValues, AQuotedWordIsReadBack) {
   for (const std::string word :
        {"plain.stl", "", "my part", "it's", "#", "a|b", "!", "$x", "\"", "\\", "\n", "tab\there\\'",

@@ -120,15 +120,6 @@ std::string shortestText(double value) {
   return {buffer.data(), result.ptr};
 }
 
-std::string alternatives(std::span<const std::string> words) {
-  std::string text;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    if (i > 0) text += i + 1 < words.size() ? ", " : " or ";
-    text += words[i];
-  }
-  return text;
-}
-
 std::string quotedForShell(std::string_view word) {
   constexpr std::string_view plain_signs = "_-+=./,:@%";
   const auto isPlain = [&](char c) {

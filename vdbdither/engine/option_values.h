@@ -36,9 +36,6 @@ double parseLengthMm(std::string_view text, const Range& range = {});
 /// The shortest text that reads back as the same double.
 std::string shortestText(double value);
 
-/// `a`, `a or b`, `a, b or c`.
-std::string alternatives(std::span<const std::string> words);
-
 /// `word` as a shell and splitWords read it: as it stands where it is plain, else in quotes, and
 /// control characters as escapes, so that the result is always a single line.
 std::string quotedForShell(std::string_view word);

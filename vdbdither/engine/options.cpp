@@ -6,6 +6,7 @@
 
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
