@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file/staged_output.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/mesh/mesh_writer.h"
 #include "ops/kernels/contour/grid_surface.h"
@@ -31,6 +32,11 @@ namespace vdbdither {
 namespace {
 
 using nlohmann::ordered_json;
+
+/// The endings of the mesh files that hold the error of each vertex.
+std::string colouredEndings() {
+  return meshEndings([](const MeshFormat& format) { return format.holds_extras; });
+}
 
 ordered_json json(const ErrorStatistics& statistics) {
   ordered_json result{{"weight", statistics.weight},         {"bias_mm", statistics.bias_mm},
@@ -131,10 +137,10 @@ std::string plainText(const ordered_json& all) {
 class Measure : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("mesh", file_,
-                       "Mesh to measure in place of the volume that reaches this step: STL, OBJ or "
-                       "PLY",
-                       false);
+    options.positional(
+        "mesh", file_,
+        "Mesh to measure in place of the volume that reaches this step: " + meshFormatNames(),
+        false);
     options.file("reference", reference_file_, "FILE", "Mesh that the surface should be");
     options.required();
     placement_.declare(options, "the reference");
@@ -147,7 +153,8 @@ class Measure : public Sink {
     options.length("margin", rules_.margin_mm, {0, 1000},
                    "Distance from the edges of a facet within which its roughness is not measured");
     options.file("report", report_file_, "FILE.json", "Writes all figures to a file");
-    options.file("map", map_file_, "FILE.ply", "Writes the mesh, coloured by its error");
+    options.file("map", map_file_, "FILE",
+                 "Writes the mesh, coloured by its error, into a " + colouredEndings() + " file");
     options.length("map-range", map_range_mm_, Range::above(0, 1000),
                    "Error that the last colours of the map stand for",
                    {"auto", "The 99th percentile of the error"});
@@ -161,9 +168,10 @@ class Measure : public Sink {
     if (!report_file_.empty())
       StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_.overwrite);
     if (!map_file_.empty()) {
-      if (!map_file_.ends_with(".ply"))
-        throw UsageError("--map: '" + map_file_ +
-                         "' must end in .ply, the only format with colours");
+      const MeshFormat* format = meshFormatNamedBy(map_file_);
+      if (format == nullptr || !format->holds_extras)
+        throw UsageError("--map: '" + map_file_ + "' cannot hold colours; name a " +
+                         colouredEndings() + " file");
       MeshWriter::check(map_file_, overwrite_.overwrite);
     }
     if (!standsAlone()) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/profile/printer_profile.h"
 #include "io/profile/target_lattice.h"
@@ -29,8 +30,8 @@ class MeshToSdf : public Source {
   void declare(Options& options) override {
     options.positionals(
         "mesh", paths_,
-        "Mesh files: STL, OBJ or PLY. Several are printed as one part, and the grid "
-        "'part' tells them apart");
+        "Mesh files: " + meshFormatNames() +
+            ". Several are printed as one part, and the grid 'part' tells them apart");
     target_.declare(options);
     placement_.declare(options, "the mesh");
     options.integer("refine-y", refine_y_, {1, 16}, "Voxels in place of one along y");

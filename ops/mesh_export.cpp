@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_writer.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/mesh/taubin.h"
@@ -18,7 +19,7 @@ namespace {
 class MeshExport : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", file_, "Mesh to write: .stl, .obj or .ply");
+    options.positional("file", file_, "Mesh to write: " + meshEndings());
     surface_grid_.declare(options);
     options.length("level", level_mm_, {-1000, 1000},
                    "Level of the surface, in place of 0 in a distance (mm) or 0.5 in a share of "
@@ -37,14 +38,13 @@ class MeshExport : public Sink {
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    const double writing = file_.ends_with(".obj") ? 0.55 : 0.2;
+    const double writing = meshFormatNamedBy(file_)->us_per_vertex;
     const double smoothing = smooths() ? taubin().usPerVertex() : 0;
     return Work{.us_per_leaf = GridSurface::vertices_per_leaf * (0.1 + writing + smoothing)};
   }
 
   [[nodiscard]] OutputEstimate output() const override {
-    // Two triangles for a vertex: 50 bytes each, or 13 and the vertex 12, or lines of text.
-    const double per_vertex = file_.ends_with(".stl") ? 100 : file_.ends_with(".ply") ? 38 : 74;
+    const double per_vertex = meshFormatNamedBy(file_)->bytes_per_vertex;
     return {file_, leaves_ * GridSurface::vertices_per_leaf * per_vertex};
   }
 
@@ -106,7 +106,7 @@ class MeshExport : public Sink {
 
 extern const OperatorInfo mesh_export;
 const OperatorInfo mesh_export{
-    "mesh-export", "The surface of a grid as a closed triangle mesh: STL, OBJ or PLY",
+    "mesh-export", "The surface of a grid as a closed triangle mesh",
     "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! mesh-export printed.stl",
     []() -> std::unique_ptr<Operator> { return std::make_unique<MeshExport>(); }};
 

@@ -11,6 +11,7 @@
 #include "io/image/exr.h"
 #include "io/image/picture.h"
 #include "io/image/png_runs.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/contour/voxel_faces.h"
@@ -52,7 +53,8 @@ class Render : public Sink {
   void declare(Options& options) override {
     options.positionals("files", files_,
                         "The .png or .exr to write; before it, a mesh to draw in place of the "
-                        "volume that reaches this step: STL, OBJ or PLY");
+                        "volume that reaches this step: " +
+                            meshFormatNames());
     surface_grid_.declare(options);
     options.flag("blocks", blocks_, "Draws the voxels that are inside as blocks");
     options.choice("look", look_, looks, "Light");

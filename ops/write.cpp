@@ -10,6 +10,7 @@
 
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
+#include "io/mesh/mesh_format.h"
 #include "io/vdb/frames.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/operator.h"
@@ -130,13 +131,11 @@ class WriteOperator : public Sink {
   [[nodiscard]] bool isPipe() const { return path_.empty() || path_ == "-"; }
 
   void refuseOtherFormats() const {
+    if (meshFormatNamedBy(path_) != nullptr)
+      throw UsageError("'" + path_ +
+                       "' is a mesh by its name, and this is a .vdb; mesh-export "
+                       "writes meshes");
     const std::string extension = std::filesystem::path(path_).extension();
-    for (const char* mesh : {".stl", ".obj", ".ply"}) {
-      if (extension == mesh)
-        throw UsageError("'" + path_ +
-                         "' is a mesh by its name, and this is a .vdb; mesh-export "
-                         "writes meshes");
-    }
     for (const char* picture : {".png", ".tif", ".tiff", ".exr", ".zip"}) {
       if (extension == picture)
         throw UsageError("'" + path_ +

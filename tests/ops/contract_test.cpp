@@ -1,7 +1,6 @@
 #include "tests/support/contract.h"
 
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 
 #include <gtest/gtest.h>
@@ -58,9 +57,7 @@ class Contract : public testing::TestWithParam<const OperatorInfo*> {
     fs::current_path(folder);
     const Mesh part =
         test::transformed(test::torusMesh({0, 0, 0}, 0.7, 0.3, 40), {20, 35, 0}, {0.11, 0.2, 0.3});
-    const std::string bytes = test::binaryStl(part);
-    std::ofstream("part.stl", std::ios::binary)
-        .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    scratch_.write(name + "/part.stl", test::binaryStl(part));
     return folder;
   }
 

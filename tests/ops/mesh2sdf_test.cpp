@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/mesh_files.h"
 #include "tests/support/shapes.h"
 #include "tests/support/told.h"
 #include "vdbdither/engine/operator.h"
@@ -23,11 +24,7 @@ using openvdb::Vec3d;
 using testing::HasSubstr;
 
 void writeObj(const std::filesystem::path& path, const Mesh& mesh) {
-  std::ofstream out(path);
-  out.precision(17);
-  for (const Vec3d& v : mesh.vertices) out << "v " << v.x() << ' ' << v.y() << ' ' << v.z() << '\n';
-  for (const Mesh::Triangle& t : mesh.triangles)
-    out << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+  std::ofstream(path) << test::objText(mesh);
 }
 
 class Mesh2Sdf : public testing::Test {

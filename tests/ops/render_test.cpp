@@ -32,9 +32,7 @@ struct Rendering : test::SinkCalled {
 class Render : public testing::Test {
  protected:
   void SetUp() override {
-    const std::string bytes = test::binaryStl(test::boxMesh({0, 0, 0}, {2, 1, 1}));
-    std::ofstream(scratch / "part.stl", std::ios::binary)
-        .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    scratch.write("part.stl", test::binaryStl(test::boxMesh({0, 0, 0}, {2, 1, 1})));
   }
   [[nodiscard]] std::string file(const std::string& name) const { return scratch / name; }
 
@@ -105,9 +103,7 @@ TEST_F(Render, BlocksHaveNoSlopes) {
 }
 
 TEST_F(Render, AFrameMakesPicturesComparable) {
-  const std::string bytes = test::binaryStl(test::boxMesh({0.5, 0.25, 0}, {1, 0.75, 0.5}));
-  std::ofstream(scratch / "small.stl", std::ios::binary)
-      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  scratch.write("small.stl", test::binaryStl(test::boxMesh({0.5, 0.25, 0}, {1, 0.75, 0.5})));
   Rendering({file("part.stl"), file("part.png")}).run();
   Rendering({file("small.stl"), file("framed.png"), "--frame", file("part.stl")}).run();
   Rendering({file("small.stl"), file("own.png")}).run();
