@@ -6,8 +6,8 @@
 
 #include "io/vdb/slab_reader.h"
 #include "ops/kernels/measure/grid_difference.h"
-#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
@@ -24,22 +24,19 @@ class Compare : public Sink {
  public:
   void declare(Options& options) override {
     options.positional("file", path_, "The .vdb or named pipe to compare with");
-    options.number("tolerance", tolerance_, 0, std::numeric_limits<double>::infinity(),
-                   "Values this close count as equal");
-    options.text("grids", names_, "NAME,NAME", "Only these grids");
-    options.flag("json", json_, "Say it as JSON");
+    options.number("tolerance", tolerance_, {.min = 0}, "Maximum difference of equal values");
+    grids_.declare(options);
+    json_.declare(options);
   }
 
   void plan(const Schema& in) override {
     schema_ = in;
     other_ = std::make_unique<Other>(*this, path_);
-    std::vector<std::string> names;
-    if (names_.empty()) {
+    std::vector<std::string> names = grids_.list();
+    if (names.empty()) {
       for (const Grids* grids : {&in.grids, &other_->schema().grids}) {
         for (const auto& [name, grid] : *grids) names.push_back(name);
       }
-    } else {
-      names = commaList(names_);
     }
     for (const std::string& name : names) {
       Finding& finding = findings_[name];
@@ -79,7 +76,7 @@ class Compare : public Sink {
     for (const auto& [name, finding] : findings_) {
       if (!finding.equal()) summary += (summary.empty() ? "" : "; ") + finding.text(name);
     }
-    report().print(json_ ? jsonText() : summary.empty() ? "equal\n" : "");
+    report().print(json_.json ? jsonText() : summary.empty() ? "equal\n" : "");
     if (!summary.empty()) throw DataError("not equal to '" + path_ + "': " + summary);
   }
 
@@ -184,8 +181,8 @@ class Compare : public Sink {
 
   std::string path_;
   double tolerance_ = 0;
-  std::string names_;
-  bool json_ = false;
+  GridListOption grids_;
+  JsonOption json_;
   Schema schema_;
   std::unique_ptr<Other> other_;
   std::map<std::string, Finding> findings_;

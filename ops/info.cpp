@@ -11,6 +11,7 @@
 #include "io/vdb/vdb.h"
 #include "ops/kernels/measure/grid_summary.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/engine/run_options.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/known_grids.h"
@@ -268,11 +269,9 @@ class Description {
   int layers_ = 0;
 };
 
-void declareJson(Options& options, bool& json) { options.flag("json", json, "Say it as JSON"); }
-
 class Info : public Sink {
  public:
-  void declare(Options& options) override { declareJson(options, json_); }
+  void declare(Options& options) override { json_.declare(options); }
 
   void plan(const Schema& in) override { description_.emplace(in); }
 
@@ -282,10 +281,12 @@ class Info : public Sink {
 
   void write(const Slab& in) override { description_->add(in); }
 
-  void finish() override { report().print(json_ ? description_->json() : description_->text()); }
+  void finish() override {
+    report().print(json_.json ? description_->json() : description_->text());
+  }
 
  private:
-  bool json_ = false;
+  JsonOption json_;
   std::optional<Description> description_;
 };
 
@@ -299,8 +300,8 @@ class InfoFile : public Tool {
   }
 
   void declare(Options& options) override {
-    options.positional("file", path_, "The .vdb to describe, if there is no chain", false);
-    declareJson(options, json_);
+    options.positional("file", path_, "The .vdb to describe if there is no chain", false);
+    json_.declare(options);
   }
 
   void run() override {
@@ -308,7 +309,7 @@ class InfoFile : public Tool {
     if (contents.grids.empty()) throw DataError("'" + path_ + "' holds no grid");
     if (!isJob(contents.grids)) return tellGrids(contents.grids);
     const Description description(contents, path_);
-    report().print(json_ ? description.json() : description.text());
+    report().print(json_.json ? description.json() : description.text());
   }
 
  private:
@@ -340,7 +341,7 @@ class InfoFile : public Tool {
       }
       json["grids"].push_back(std::move(entry));
     }
-    report().print(json_ ? json.dump() + "\n" : text.str());
+    report().print(json_.json ? json.dump() + "\n" : text.str());
   }
 
   /// Where the voxels of a grid lie.
@@ -372,7 +373,7 @@ class InfoFile : public Tool {
   }
 
   std::string path_;
-  bool json_ = false;
+  JsonOption json_;
 };
 
 }  // namespace

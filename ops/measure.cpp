@@ -23,6 +23,7 @@
 #include "ops/kernels/mesh/taubin.h"
 #include "ops/kernels/picture/diverging_colours.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
 
@@ -136,59 +137,43 @@ std::string plainText(const ordered_json& all) {
 class SurfaceMeasurement {
  public:
   void declare(Options& options) {
-    options.text("reference", reference_file_, "FILE", "The mesh that it should be");
-    options.choice("unit", unit_, {"mm", "cm", "m", "in", "um"},
-                   "What the reference's numbers mean");
-    options.number("scale", scale_, 1e-6, 1e6, "Scales the reference about the origin");
-    options.length("fit", placement_.fit_mm,
-                   "Scales the reference until its longest axis has this length");
-    options.triple("rotate", placement_.rotate_degrees, "X,Y,Z",
-                   "Turns the reference about x, then y, then z, in degrees");
-    options.flag("place", placement_.on_bed,
-                 "Puts the reference on the bed: its bounding box begins at the origin");
-    options.text("grid", grid_, "NAME",
-                 "Whose surface comes down the chain: of solid its voxels, of printed, displaced "
-                 "and surface a level; auto takes the furthest down the chain");
-    options.choice("smooth", smooth_, {"none", "taubin"},
-                   "taubin: Taubin's smoothing before, lambda 0.5 and mu -0.53");
-    options.integer("iterations", taubin_.iterations, 1, 100000, "How often it smooths");
-    options.length("spacing", spacing_mm_,
-                   "Triangles with longer sides are measured at points in between too");
-    options.length("cutoff", rules_.cutoff_mm,
-                   "The shortest wavelength that counts for the band-limited roughness");
-    options.length("margin", rules_.margin_mm,
-                   "Roughness leaves out what is nearer than this to an edge of a facet");
-    options.text("report", report_file_, "FILE.json", "Writes all figures to a file");
-    options.text("map", map_file_, "FILE",
+    options.file("reference", reference_file_, "FILE", "Mesh that the surface should be");
+    options.required();
+    placement_.declare(options, "the reference");
+    surface_grid_.declare(options);
+    smoothing_.declare(options);
+    options.length("spacing", spacing_mm_, {1e-3, 1000},
+                   "Maximum distance between the points at which a triangle is measured");
+    options.length("cutoff", rules_.cutoff_mm, {1e-3, 1e4},
+                   "Minimum wavelength that counts for the band-limited roughness");
+    options.length("margin", rules_.margin_mm, {0, 1000},
+                   "Distance from the edges of a facet within which its roughness is not measured");
+    options.file("report", report_file_, "FILE.json", "Writes all figures to a file");
+    options.file("map", map_file_, "FILE",
                  "Writes the mesh, coloured by its error, into a " + colouredEndings() + " file");
-    options.length("map-range", map_range_mm_,
-                   "The error of the map's last colours; 0 takes the 99th percentile");
-    options.flag("json", json_, "Prints all figures, as JSON");
-    options.flag("overwrite", overwrite_, "Replace files that are there");
+    options.length("map-range", map_range_mm_, Range::above(0, 1000),
+                   "Error that the last colours of the map stand for",
+                   {"auto", "The 99th percentile of the error"});
+    json_.declare(options);
+    overwrite_.declare(options, "each file");
   }
 
   /// Makes every check that does not need the surface, and reads the reference.
   void begin(Reporter& reporter) {
-    if (reference_file_.empty())
-      throw UsageError("--reference is missing: name the mesh that the surface should be");
-    for (const auto& [name, value] :
-         {std::pair("--spacing", spacing_mm_), std::pair("--cutoff", rules_.cutoff_mm)}) {
-      if (!(value > 0)) throw UsageError(std::string(name) + ": 0 mm is no length to look at");
-    }
     if (!report_file_.empty())
-      StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_);
+      StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_.overwrite);
     if (!map_file_.empty()) {
       const MeshFormat* format = meshFormatNamedBy(map_file_);
       if (format == nullptr || !format->holds_extras)
         throw UsageError("--map: '" + map_file_ + "' cannot hold colours; name a " +
                          colouredEndings() + " file");
-      MeshWriter::check(map_file_, overwrite_);
+      MeshWriter::check(map_file_, overwrite_.overwrite);
     }
     readReference(reporter);
   }
 
-  [[nodiscard]] const std::string& grid() const { return grid_; }
-  [[nodiscard]] bool smooths() const { return smooth_ != "none"; }
+  [[nodiscard]] const SurfaceGridOption& surfaceGrid() const { return surface_grid_; }
+  [[nodiscard]] bool smooths() const { return smoothing_.smoothing != Smoothing::none; }
 
   [[nodiscard]] Work work(const Lattice& lattice) const {
     // Triangles at the surface are about as long as the diagonal of a voxel's largest face.
@@ -197,7 +182,7 @@ class SurfaceMeasurement {
         std::sqrt(pitch.lengthSqr() - std::pow(std::min({pitch.x(), pitch.y(), pitch.z()}), 2));
     const double cuts = side_mm > spacing_mm_ ? std::ceil(side_mm / spacing_mm_) : 0;
     const double points = 1 + 2 * cuts * cuts;  // for a vertex
-    const double smoothing = smooths() ? cost::smoothingUs(taubin_.iterations) : 0;
+    const double smoothing = smooths() ? cost::smoothingUs(smoothing_.iterations) : 0;
     const double vertex_us = cost::measure_us + cost::measure_us_per_point * points + smoothing;
     const auto triangles = static_cast<double>(reference_->mesh().triangles.size());
     return Work{.us_per_surface_leaf = GridSurface::vertices_per_leaf * vertex_us,
@@ -212,7 +197,7 @@ class SurfaceMeasurement {
   void finish(Mesh mesh, const std::string& of, const Lattice* lattice, VoxelComponents* components,
               Reporter& reporter) const {
     const auto progress = [&](double fraction) { reporter.progress(fraction); };
-    if (smooths()) smooth(mesh, taubin_, progress);
+    if (smooths()) smooth(mesh, {.iterations = smoothing_.iterations}, progress);
     const SurfaceErrors errors = surfaceErrors(mesh, *reference_, spacing_mm_, progress);
     const ordered_json all = figures(errors, mesh, of, lattice, components);
     for (const char* name :
@@ -228,7 +213,7 @@ class SurfaceMeasurement {
     }
     if (!map_file_.empty()) writeMap(mesh, errors, all["map_range_mm"].get<double>());
     if (staged) staged->commit();
-    if (json_) {
+    if (json_.json) {
       reporter.print(all.dump(1) + "\n");
     } else if (report_file_.empty()) {
       reporter.print(plainText(all));
@@ -238,8 +223,8 @@ class SurfaceMeasurement {
  private:
   void readReference(Reporter& reporter) {
     Mesh mesh = readMesh(reference_file_, [&](const std::string& text) { reporter.warn(text); });
-    placement_.factor = unitMm(unit_) * scale_;
-    place(mesh, placement_);
+    const MeshPlacementOptions& given = placement_;
+    place(mesh, {given.rotate_degrees, given.mmPerUnit(), given.fit_mm.value_or(0), given.on_bed});
     MeshRepairs repairs;
     mesh = repaired(std::move(mesh), repairs);
     if (mesh.triangles.empty())
@@ -256,7 +241,7 @@ class SurfaceMeasurement {
     ordered_json all;
     all["surface"] = json(mesh);
     all["surface"]["of"] = of;
-    all["surface"]["smoothing"] = smooths() ? taubin_.iterations : 0;
+    all["surface"]["smoothing"] = smooths() ? smoothing_.iterations : 0;
     all["reference"] = json(reference_->mesh());
     all["reference"]["of"] = reference_file_;
     const double volume = all["surface"]["volume_mm3"];
@@ -279,7 +264,7 @@ class SurfaceMeasurement {
       all["components"] = json(counts.components);
       all["cavities"] = json(counts.cavities);
     }
-    all["map_range_mm"] = map_range_mm_ > 0 ? map_range_mm_ : by_area.percentile(99);
+    all["map_range_mm"] = map_range_mm_.value_or(by_area.percentile(99));
     return all;
   }
 
@@ -300,19 +285,16 @@ class SurfaceMeasurement {
   }
 
   std::string reference_file_;
-  std::string unit_ = "mm";
-  double scale_ = 1;
-  MeshPlacement placement_;
-  std::string grid_ = "auto";
-  std::string smooth_ = "none";
-  Taubin taubin_;
+  MeshPlacementOptions placement_;
+  SurfaceGridOption surface_grid_;
+  SmoothingOptions smoothing_;
   double spacing_mm_ = 0.1;
   RoughnessRules rules_;
   std::string report_file_;
   std::string map_file_;
-  double map_range_mm_ = 0;
-  bool json_ = false;
-  bool overwrite_ = false;
+  std::optional<double> map_range_mm_;
+  JsonOption json_;
+  OverwriteOption overwrite_;
 
   std::optional<ClosestPoints> reference_;
 };
@@ -325,7 +307,7 @@ class Measure : public Sink {
   void plan(const Schema& in) override {
     std::vector<std::string> there;
     for (const auto& [name, grid] : in.grids) there.push_back(name);
-    name_ = chosenSurfaceGrid(there, measurement_.grid());
+    name_ = chosenSurfaceGrid(there, measurement_.surfaceGrid().grid);
     lattice_ = in.lattice;
     surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
     components_.emplace(surface_->frame());
@@ -373,8 +355,8 @@ class MeasureMesh : public Tool {
   static bool takes(const std::string& file) { return !file.ends_with(".vdb"); }
 
   void declare(Options& options) override {
-    options.positional("mesh", file_,
-                       "A mesh to measure, if there is no chain: " + meshFormatNames(), false);
+    options.positional("mesh", file_, "Mesh to measure if there is no chain: " + meshFormatNames(),
+                       false);
     measurement_.declare(options);
   }
 

@@ -15,6 +15,7 @@
 #include "io/stack/stack_files.h"
 #include "io/stack/stack_writer.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/known_grids.h"
@@ -27,32 +28,30 @@ namespace {
 class SliceExport : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("folder", folder_,
-                       "Folder that will hold the stack, or a zip archive: NAME.zip");
-    std::vector<std::string> names;
-    std::string help;
+    options.positional("folder", folder_, "Folder for the stack, or a zip archive: NAME.zip");
+    std::vector<Word> formats;
     for (const SliceFormat* format : sliceFormats()) {
-      names.emplace_back(format->name);
-      help += (help.empty() ? "" : ". ") + names.back() + ": " + std::string(format->summary);
+      formats.push_back({std::string(format->name), std::string(format->summary)});
       encoders_[format] = format->encoder();
     }
-    options.choice("format", format_name_, names, help);
-    options.text("prefix", names_.prefix, "TEXT", "What the file names begin with");
-    options.integer("digits", names_.digits, 1, 9, "Digits of the running number, zeros in front");
-    options.integer("first", names_.first, 0, 1000000, "Number of the lowest layer");
-    options.integer("padding", stack_.frame.padding, 0, 100000,
+    options.choice("format", format_name_, std::move(formats), "Format of the slices");
+    options.text("prefix", names_.prefix, "TEXT", "Beginning of the file names");
+    options.integer("digits", names_.digits, {1, 9},
+                    "Digits of the number of a slice, with zeros in front");
+    options.integer("first", names_.first, {0, 1000000}, "Number of the lowest layer");
+    options.integer("padding", stack_.frame.padding, {0, 100000},
                     "Empty voxels added on each side in x and y");
-    options.flag("flip-x", stack_.frame.flip_x,
-                 "Mirror left to right. By default a slice is seen from above: x to the right");
+    options.flag(
+        "flip-x", stack_.frame.flip_x,
+        "Mirrors left to right; by default a slice is seen from above, with x to the right");
     options.flag("flip-y", stack_.frame.flip_y,
-                 "Mirror top to bottom. By default a slice is seen from above: the top row has the "
-                 "greatest y");
+                 "Mirrors top to bottom; by default the maximum y is the top row");
     options.text("background", background_, "COLOUR",
-                 "Colour of what is not printed, in " + sliceFormatNames([](const auto& format) {
+                 "Colour of empty voxels in " + sliceFormatNames([](const auto& format) {
                    return format.showsColours();
-                 }) + ": #rrggbb, or r,g,b,a of 0 to 255");
+                 }) + ": #rrggbb, or r,g,b,a from 0 to 255");
     for (const SliceFormat* format : sliceFormats()) encoders_[format]->declare(options);
-    options.flag("overwrite", overwrite_, "Replace a stack that is there already");
+    overwrite_.declare(options, "the stack");
   }
 
   void plan(const Schema& in) override {
@@ -66,7 +65,7 @@ class SliceExport : public Sink {
     planColours();
     if (names_.prefix.find('/') != std::string::npos)
       throw UsageError("--prefix: '" + names_.prefix + "' must not hold a '/'");
-    StackOutput::check(folder_, overwrite_);
+    StackOutput::check(folder_, overwrite_.overwrite);
     if (in.lattice.box.dim().x() + std::int64_t{2} * stack_.frame.padding > 1 << 24 ||
         in.lattice.box.dim().y() + std::int64_t{2} * stack_.frame.padding > 1 << 24) {
       throw UsageError("slices would be more than 16777216 voxels wide");
@@ -199,7 +198,7 @@ class SliceExport : public Sink {
   std::string format_name_ = "png";
   std::string background_ = "0,0,0,255";
   SliceNames names_{"slice_", 5, 0};
-  bool overwrite_ = false;
+  OverwriteOption overwrite_;
   std::map<const SliceFormat*, std::unique_ptr<SliceEncoder>> encoders_;
 
   Schema schema_;

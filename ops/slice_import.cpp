@@ -22,7 +22,7 @@ class SliceImport : public Source {
  public:
   void declare(Options& options) override {
     options.positional("stack", path_,
-                       "What slice-export made: the folder, its manifest.json, or the zip archive");
+                       "Stack of slice-export: the folder, its manifest.json, or the zip archive");
   }
 
   Schema plan() override {

@@ -12,23 +12,19 @@ namespace vdbdither {
 
 namespace {
 
-constexpr std::array<std::pair<const char*, ExrPacking>, 5> packings{{{"none", ExrPacking::none},
-                                                                      {"rle", ExrPacking::rle},
-                                                                      {"zips", ExrPacking::zips},
-                                                                      {"zip", ExrPacking::zip},
-                                                                      {"piz", ExrPacking::piz}}};
+constexpr std::array<Choice<ExrPacking>, 5> packings{
+    {{ExrPacking::none, "none", "Uncompressed"},
+     {ExrPacking::rle, "rle", "Run lengths of each row"},
+     {ExrPacking::zips, "zips", "Deflate of each row"},
+     {ExrPacking::zip, "zip", "Deflate of 16 rows together"},
+     {ExrPacking::piz, "piz", "Wavelets of 32 rows together"}}};
 
 class ExrSlices : public SliceEncoder {
  public:
   void declare(Options& options) override {
-    std::vector<std::string> names;
-    for (const auto& [name, packing] : packings) names.emplace_back(name);
-    options.choice(
-        "exr-packing", packing_, names,
-        "How exr is packed, always without loss: zips and rle by rows, zip by 16 and piz "
-        "by 32 of them");
-    options.integer("exr-tile", tile_, 0, 4096, "Edge of the tiles of exr; 0 makes rows");
-    options.flag("exr-half", half_, "Distances in exr take 16 bits in place of 32");
+    options.choice("exr-packing", packing_, packings, "Lossless compression of exr");
+    options.integer("exr-tile", tile_, {0, 4096}, "Edge of the tiles of exr; 0 stores rows");
+    options.flag("exr-half", half_, "Stores the distances of exr in 16 bits, not 32");
   }
 
   void plan(const Manifest& manifest, const Grids& grids) override {
@@ -63,10 +59,7 @@ class ExrSlices : public SliceEncoder {
                      [axis](const openvdb::Vec3s& normal) { return normal[axis]; });
       }
     };
-    const auto* const packing =
-        std::find_if(packings.begin(), packings.end(),
-                     [&](const auto& entry) { return entry.first == packing_; });
-    const ExrFormat format{pitchMm().x() / pitchMm().y(), packing->second, tile_};
+    const ExrFormat format{pitchMm().x() / pitchMm().y(), packing_, tile_};
     const SliceFrame& frame = stack().frame;
     return {{layer.name + ".exr", "",
              encodeExr(frame.width(), frame.height(), format, channels_, fill)}};
@@ -98,7 +91,7 @@ class ExrSlices : public SliceEncoder {
     }
   }
 
-  std::string packing_ = "zips";
+  ExrPacking packing_ = ExrPacking::zips;
   int tile_ = 0;
   bool half_ = false;
   std::vector<ExrChannel> channels_;
@@ -113,7 +106,7 @@ RunImage decodeMaterials(std::span<const std::uint8_t> bytes) {
 extern const SliceFormat exr;
 const SliceFormat exr{
     .name = "exr",
-    .summary = "material index, and distance and normal where they are there",
+    .summary = "Material index, and distance and normal where there are any",
     .pixel = SlicePixel::index,
     .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<ExrSlices>(); },
     .decode = decodeMaterials,

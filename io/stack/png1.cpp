@@ -22,7 +22,7 @@ class BitPngSlices : public SliceEncoder {
 extern const SliceFormat png1;
 const SliceFormat png1{
     .name = "png1",
-    .summary = "a stack of 1 bit a voxel for each material, in a folder of its own",
+    .summary = "For each material a folder of slices with 1 bit per voxel",
     .pixel = SlicePixel::one_material,
     .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<BitPngSlices>(); },
     .decode = decodePng,

@@ -21,7 +21,7 @@ class GreyPngSlices : public SliceEncoder {
 extern const SliceFormat png8;
 const SliceFormat png8{
     .name = "png8",
-    .summary = "grey, 255 where printed, else 0",
+    .summary = "Grey: 255 where printed, else 0",
     .pixel = SlicePixel::printed,
     .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<GreyPngSlices>(); },
     .decode = decodePng,

@@ -20,7 +20,7 @@ class TiffSlices : public SliceEncoder {
 extern const SliceFormat tiff;
 const SliceFormat tiff{
     .name = "tiff",
-    .summary = "a palette of the colours",
+    .summary = "A palette of the colours of the materials",
     .pixel = SlicePixel::palette,
     .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<TiffSlices>(); },
     .decode = decodeTiff,

@@ -25,7 +25,7 @@ class BitTiffSlices : public SliceEncoder {
 extern const SliceFormat tiff1;
 const SliceFormat tiff1{
     .name = "tiff1",
-    .summary = "a stack of 1 bit a voxel for each material, in a folder of its own",
+    .summary = "For each material a folder of slices with 1 bit per voxel",
     .pixel = SlicePixel::one_material,
     .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<BitTiffSlices>(); },
     .decode = decodeTiff,

@@ -103,7 +103,10 @@ TEST_P(Contract, ItsWordsAreOfOneStyle) {
   const std::unique_ptr<Operator> made = GetParam()->make();
   made->declare(options);
   expect_style(std::string(GetParam()->summary));
-  for (const Option& option : options.all()) expect_style(option.help);
+  for (const Option& option : options.all()) {
+    expect_style(option.help);
+    for (const Word& word : option.words) expect_style(word.meaning);
+  }
 }
 
 TEST_P(Contract, OnAFileOfItsOwnItTakesTheSameOptions) {
@@ -165,6 +168,45 @@ TEST_P(Contract, ItKeepsWhatAFilterPromises) {
   filter->plan(schema);
   for (const int height : {8, 40})
     EXPECT_EQ(firstBreach(*filter, schema, contents.grids, height), "");
+}
+
+/// Without what consumes grids, and without the names of their files.
+std::vector<Step> onlyMakers(const std::vector<Step>& steps) {
+  std::vector<Step> makers;
+  for (Step step : steps) {
+    const auto output = std::find(step.arguments.begin(), step.arguments.end(), "-o");
+    if (output != step.arguments.end()) step.arguments.erase(output, output + 2);
+    if (!dynamic_cast<Sink*>(findOperator(step.verb).make().get())) makers.push_back(step);
+  }
+  return makers;
+}
+
+/// The chain that a history tells of: its last source and what follows.
+std::vector<Step> stepsOf(const std::string& history) {
+  std::vector<Step> steps;
+  std::istringstream text(history);
+  for (std::string line; std::getline(text, line);) {
+    const std::vector<Step> step = parseChain(splitWords(line));
+    EXPECT_EQ(step.size(), 1U) << line;
+    if (dynamic_cast<Source*>(findOperator(step.front().verb).make().get())) steps.clear();
+    steps.push_back(step.front());
+  }
+  return steps;
+}
+
+TEST_P(Contract, ItsHistoryRunsAgainToTheSameBytes) {
+  std::vector<std::vector<Step>> before = chains();
+  std::vector<Step> steps = onlyMakers(before.back());
+  before.pop_back();
+  if (steps.empty()) GTEST_SKIP() << "its example makes no grid";
+  for (const std::vector<Step>& chain : before) runChain(chain);
+  steps.push_back({"write", {"made.vdb"}});
+  runChain(steps);
+  std::vector<Step> again = stepsOf(readVdb("made.vdb").metadata.at("vdbdither:history"));
+  EXPECT_EQ(again.size(), steps.size() - 1 - (steps.front().verb == "read" ? 1 : 0));
+  again.push_back({"write", {"again.vdb"}});
+  runChain(again);
+  EXPECT_TRUE(test::fileBytes("made.vdb") == test::fileBytes("again.vdb"));
 }
 
 std::string nameOf(const testing::TestParamInfo<const OperatorInfo*>& info) {

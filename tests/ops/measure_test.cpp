@@ -157,15 +157,18 @@ TEST_F(Measure, RefusesWhatCannotBeMeasured) {
     return [=] { MeasuringMesh(arguments).run(); };
   };
   EXPECT_THAT(plan({file("part.stl")}),
-              ThrowsMessage<UsageError>(
-                  "--reference is missing: name the mesh that the surface should be"));
+              ThrowsMessage<UsageError>("'--reference' is missing; see --help"));
   EXPECT_THAT(plan({file("part.stl"), "--reference", file("none.stl")}),
               ThrowsMessage<DataError>(HasSubstr("no such file")));
   EXPECT_THAT(
       plan({file("part.stl"), "--reference", file("part.stl"), "--map", "map.stl"}),
       ThrowsMessage<UsageError>(HasSubstr("--map: 'map.stl' cannot hold colours; name a .ply")));
-  EXPECT_THAT(plan({file("part.stl"), "--reference", file("part.stl"), "--spacing", "0"}),
-              ThrowsMessage<UsageError>("--spacing: 0 mm is no length to look at"));
+  for (const char* spacing : {"0", "1e-5mm", "2m"}) {
+    EXPECT_THAT(plan({file("part.stl"), "--reference", file("part.stl"), "--spacing", spacing}),
+                ThrowsMessage<UsageError>("--spacing: '" + std::string(spacing) +
+                                          "' is not accepted; the length must be from 0.001 mm to "
+                                          "1000 mm"));
+  }
   EXPECT_THAT(
       plan({file("part.stl"), "--reference", file("part.stl"), "--report", file("part.stl")}),
       ThrowsMessage<UsageError>(HasSubstr("exists; --overwrite replaces it")));

@@ -129,13 +129,16 @@ TEST_F(Render, RefusesWhatCannotBeDrawn) {
   const auto plan = [&](const std::vector<std::string>& arguments) {
     return [=] { RenderingMesh(arguments).run(); };
   };
-  EXPECT_THAT(plan({"a.stl", "b.jpg"}), ThrowsMessage<UsageError>("'b.jpg' is no .png or .exr"));
+  EXPECT_THAT(plan({"a.stl", "b.jpg"}),
+              ThrowsMessage<UsageError>("'b.jpg' must end in .png or .exr"));
   EXPECT_THAT(plan({"a.stl", file("b.png"), "--blocks"}),
               ThrowsMessage<UsageError>("--blocks: a mesh has no voxels"));
   EXPECT_THAT(plan({"a.stl", "b.png", "--pixel", "0"}),
-              ThrowsMessage<UsageError>("--pixel: must be more than 0 mm"));
+              ThrowsMessage<UsageError>("--pixel: '0' is not accepted; the length must be "
+                                        "greater than 0 mm, up to 1000 mm"));
   EXPECT_THAT(plan({"a.stl", "b.png", "--distance", "0"}),
-              ThrowsMessage<UsageError>("--distance: must be more than 0 mm"));
+              ThrowsMessage<UsageError>("--distance: '0' is not accepted; the length must be "
+                                        "greater than 0 mm, up to 1000000 mm"));
   EXPECT_THAT(plan({"a.stl", file("b.png"), "--frame", file("none.stl")}),
               ThrowsMessage<DataError>(HasSubstr("no such file")));
   EXPECT_THAT([&] { Rendering({file("b.png")})->plan({}); },

@@ -1,6 +1,6 @@
 #include "vdbdither/engine/stage.h"
 
-#include "vdbdither/model/known_grids.h"
+#include "vdbdither/engine/history.h"
 
 namespace vdbdither {
 
@@ -22,7 +22,7 @@ StagePlan Stage::plan(const Schema& in) {
                            : StagePlan::Kind::sink;
     plan.schema = planOperator(in, plan.reads);
     plan.arguments = options_.canonical();  // now, as the operator may have resolved values
-    addHistory(plan.schema);
+    if (!info_.transport && !sink()) addToHistory(plan.schema, info_.name, options_);
     plan.is_barrier = operator_->isBarrier() || widest(plan.reads).whole;
     plan.memory_bytes = operator_->memoryBytes();
     for (const Input* input : operator_->inputs()) {
@@ -51,16 +51,6 @@ Schema Stage::planOperator(const Schema& in, std::vector<Read>& reads) {
     for (const auto& [name, grid] : in.grids) reads.push_back({name, Reach::point()});
   }
   return in;
-}
-
-/// Appends the command line of this step, with every value that shapes the result.
-void Stage::addHistory(Schema& schema) const {
-  if (info_.transport || sink()) return;
-  std::string& history = schema.metadata[history_key];
-  if (!history.empty()) history += '\n';
-  history += name();
-  if (const std::string arguments = options_.canonical(); !arguments.empty())
-    history += ' ' + arguments;
 }
 
 }  // namespace vdbdither

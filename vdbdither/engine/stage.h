@@ -38,7 +38,6 @@ class Stage {
 
  private:
   [[nodiscard]] Schema planOperator(const Schema& in, std::vector<Read>& reads);
-  void addHistory(Schema& schema) const;
 
   const OperatorInfo& info_;
   Options options_;
