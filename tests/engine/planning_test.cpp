@@ -97,18 +97,18 @@ TEST(Planning, OutputsAreThoseOfTheWantedLayers) {
 }
 
 TEST(Planning, TheHistoryHasALineForEverySourceAndFilter) {
-  const JobPlan plan = planOf("numbers --top 8 ! sum --below 2 ! keep");
+  const JobPlan plan = planOf("numbers --top 8 ! enlarge --by 2 ! keep");
+  const std::string made_by = std::string(" # vdbdither ") + version;
   EXPECT_EQ(plan.stages.back().schema.metadata.at("vdbdither:history"),
-            std::string("numbers --bottom 0 --top 8 # vdbdither ") + version +
-                "\nsum --below 2 --above 0 --fail-at 1000 # vdbdither " + version);
+            "numbers --bottom 0 --top 8" + made_by + "\nenlarge --by 2" + made_by);
+  EXPECT_EQ(plan.stages[0].arguments, "--bottom 0 --top 8");
 }
 
 TEST(Planning, RefusesWhatCannotBe) {
   EXPECT_THAT(planning("numbers ! keep --layers 4:17"),
               ThrowsMessage<UsageError>("--layers: '4:17' is not A:B with 0 <= A < B <= 16"));
   EXPECT_THAT(planning("numbers ! keep --slab 12"),
-              ThrowsMessage<UsageError>(HasSubstr(
-                  "--slab: '12' is not accepted; the value must be a multiple of 8, auto or all")));
+              ThrowsMessage<UsageError>("--slab: '12' is not a multiple of 8, auto or all"));
   EXPECT_THAT(
       planning("numbers ! write nowhere.vdb --stream"),
       ThrowsMessage<UsageError>("write: needs the whole volume at once, which --stream forbids"));
