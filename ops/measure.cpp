@@ -18,7 +18,7 @@
 #include "ops/kernels/mesh/closest_point.h"
 #include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/mesh_placement.h"
-#include "ops/kernels/mesh/mesh_repair.h"
+#include "ops/kernels/mesh/solid_mesh.h"
 #include "ops/kernels/mesh/taubin.h"
 #include "ops/kernels/picture/diverging_colours.h"
 #include "vdbdither/engine/operator.h"
@@ -211,7 +211,7 @@ class Measure : public Sink {
   void write(const Slab& in) override {
     const GridConstPtr& grid = in.grids.at(name_);
     for (const BitLayer& layer : surface_->insideOf(grid, in.core)) components_->add(layer);
-    take(surface_->add(grid, in.core));
+    append(mesh_, surface_->add(grid, in.core));
   }
 
   void finish() override {
@@ -221,7 +221,7 @@ class Measure : public Sink {
       mesh_ = readMesh(file_, warn);
       if (smooth_ != "none") checkClosed();
     } else {
-      take(surface_->finish());
+      append(mesh_, surface_->finish());
     }
     if (mesh_.triangles.empty())
       throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
@@ -253,30 +253,25 @@ class Measure : public Sink {
     Mesh mesh = readMesh(reference_file_, [this](const std::string& text) { report().warn(text); });
     placement_.factor = unitMm(unit_) * scale_;
     place(mesh, placement_);
-    MeshRepairs repairs;
-    mesh = repaired(std::move(mesh), repairs);
-    if (mesh.triangles.empty())
+    // Errors are measured to the triangles given, so that nothing is guessed in their place.
+    SolidMesh solid = solidMesh(std::move(mesh), {.guess = false, .find_walls = false});
+    if (solid.mesh.triangles.empty())
       throw DataError(
           "--reference: the mesh has no surface: all its triangles are degenerate or "
           "cancel");
-    for (const std::string& line : repairs.lines()) report().warn("--reference: " + line);
-    reference_.emplace(std::move(mesh));
+    for (const std::string& line : solid.report.repairs.lines())
+      report().warn("--reference: " + line);
+    reference_.emplace(std::move(solid.mesh));
   }
 
-  /// What smoothing makes of borders is nothing to measure.
+  /// Refuses to smooth a mesh that is not closed: borders would be measured as smoothing left them.
   void checkClosed() const {
-    MeshRepairs repairs;
-    repaired(mesh_, repairs);
-    const std::vector<std::string> lines = repairs.lines();
+    const std::vector<std::string> lines =
+        solidMesh(mesh_, {.guess = false, .find_walls = false}).report.repairs.lines();
     if (!lines.empty()) {
       throw DataError("--smooth: '" + file_ + "' is no closed mesh (" + lines.front() +
                       "); measure it as it is, or repair it first");
     }
-  }
-
-  void take(const SurfacePiece& piece) {
-    mesh_.vertices.insert(mesh_.vertices.end(), piece.vertices.begin(), piece.vertices.end());
-    mesh_.triangles.insert(mesh_.triangles.end(), piece.triangles.begin(), piece.triangles.end());
   }
 
   [[nodiscard]] ordered_json figures(const SurfaceErrors& errors) {

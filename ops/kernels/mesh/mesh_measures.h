@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include <openvdb/math/Vec3.h>
 
 #include "vdbdither/model/mesh.h"
@@ -11,8 +13,9 @@ struct MeshBounds {
   openvdb::Vec3d min, max;
 };
 
-/// Bounds of all vertices. `mesh` must have a vertex.
-MeshBounds boundsOf(const Mesh& mesh);
+/// Returns the bounds of all vertices, of which there must be one.
+MeshBounds boundsOf(std::span<const Mesh> meshes);
+inline MeshBounds boundsOf(const Mesh& mesh) { return boundsOf(std::span(&mesh, 1)); }
 
 /// Returns the area of all triangles, mm².
 double areaOf(const Mesh& mesh);

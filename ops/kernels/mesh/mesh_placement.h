@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -22,8 +23,12 @@ struct MeshPlacement {
   bool on_bed = false;                     ///< the bounding box then begins at the origin
 };
 
-/// Turns, scales, then moves. Throws DataError where a mesh without extent is to fit.
-void place(Mesh& mesh, const MeshPlacement& placement);
+/// Turns, scales, then moves meshes as one. Throws DataError where meshes without extent have to
+/// fit.
+void place(std::span<Mesh> meshes, const MeshPlacement& placement);
+inline void place(Mesh& mesh, const MeshPlacement& placement) {
+  place(std::span(&mesh, 1), placement);
+}
 
 /// The units that a mesh's numbers can be in, and mm in each.
 inline constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/model/mesh.h"
+#include "ops/kernels/mesh/derived_mesh.h"
 
 namespace vdbdither {
 
@@ -35,18 +35,18 @@ struct MeshRepairs {
 /// that the winding number is a whole number everywhere, and positive within parts that are not
 /// cavities.
 ///
-/// Vertices at the same position become one (that is not counted as a repair: file formats without
+/// Vertices at the same position become one (this does not count as a repair: file formats without
 /// shared vertices need it); at borders also those within a micrometre. Degenerate and duplicate
-/// triangles go. Triangles are turned to agree with their neighbours, parts that are inside out and
-/// in no other part are turned, and loops of borders are filled; see hole_filling.h. Deterministic;
-/// the order of the triangles that stay is kept, and so are all vertices, behind which those of
-/// fillings come.
+/// triangles are dropped. Triangles are turned to agree with their neighbours, parts that are
+/// inside out and in no other part are turned, and loops of borders are filled; see hole_filling.h.
+/// Triangles keep their order and their sources, those of fillings come last and have none. All
+/// vertices stay, new ones come last. Deterministic.
 ///
-/// `mesh` in mm.
-Mesh repaired(Mesh mesh, MeshRepairs& repairs);
+/// `triangles` in mm.
+DerivedMesh repaired(DerivedMesh triangles, MeshRepairs& repairs);
 
 /// The first steps of `repaired` alone: vertices at the same position become one, and degenerate
-/// and duplicate triangles go.
-Mesh withoutDuplicates(Mesh mesh, MeshRepairs& repairs);
+/// and duplicate triangles are dropped.
+DerivedMesh withoutDuplicates(DerivedMesh triangles, MeshRepairs& repairs);
 
 }  // namespace vdbdither

@@ -3,13 +3,13 @@
 #include <cstddef>
 #include <functional>
 
-#include "vdbdither/model/mesh.h"
+#include "ops/kernels/mesh/derived_mesh.h"
 
 namespace vdbdither {
 
-/// The surface of a solid that triangles hint at.
-struct WindingSurface {
-  Mesh mesh;            ///< closed, faces outwards; empty where there is no solid
+/// The surface of a solid that triangles hint at: closed, faces outwards, empty where there is no
+/// solid. The source of a triangle is one that the surface follows there; none between triangles.
+struct WindingSurface : DerivedMesh {
   double cell_mm = 0;   ///< the edge of the smallest cells that it was found on
   bool turned = false;  ///< the triangles face inwards: what counts is the number below −½
 };
@@ -22,7 +22,7 @@ struct WindingSurface {
 ///
 /// By dual contouring of an octree: every side of a triangle is met by as many in the opposite
 /// direction. The cells divide where one vertex does not tell what the surface does, into at most
-/// about `most_leaves`. Walls and gaps thinner than 1/2500 of the longest side may be lost, and so
+/// about `max_leaves`. Walls and gaps thinner than 1/2500 of the longest side may be lost, and so
 /// may what is thinner than a cell where the cells no longer divide. What lies farther from the
 /// triangles' bounding box than half its longest side is left out. The same bits for any number of
 /// threads.
@@ -30,6 +30,6 @@ struct WindingSurface {
 /// `triangles` in mm. `progress` is told fractions, from the calling thread.
 WindingSurface windingSurface(const Mesh& triangles,
                               const std::function<void(double)>& progress = {},
-                              std::size_t most_leaves = 3'000'000);
+                              std::size_t max_leaves = 3'000'000);
 
 }  // namespace vdbdither
