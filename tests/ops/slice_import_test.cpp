@@ -13,6 +13,7 @@
 #include "tests/support/drawn_grids.h"
 #include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/slabs.h"
 #include "tests/support/told.h"
 #include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
