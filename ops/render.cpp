@@ -111,17 +111,17 @@ class Render : public Sink {
 
   void write(const Slab& in) override {
     const GridConstPtr& grid = in.grids.at(name_);
-    if (!faces_) return take(surface_->add(grid, in.core));
+    if (!faces_) return append(mesh_, surface_->add(grid, in.core));
     int z = in.core.begin;
     for (BitLayer& layer : surface_->insideOf(grid, in.core))
-      take(faces_->add(std::move(layer), z++));
+      append(mesh_, faces_->add(std::move(layer), z++));
   }
 
   void finish() override {
     if (standsAlone()) {
       mesh_ = meshOf(files_.front());
     } else {
-      take(faces_ ? faces_->finish() : surface_->finish());
+      append(mesh_, faces_ ? faces_->finish() : surface_->finish());
     }
     if (mesh_.triangles.empty())
       throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
@@ -168,11 +168,6 @@ class Render : public Sink {
       return std::nullopt;
     }
     return 0.35 * pixels(camera);
-  }
-
-  void take(const SurfacePiece& piece) {
-    mesh_.vertices.insert(mesh_.vertices.end(), piece.vertices.begin(), piece.vertices.end());
-    mesh_.triangles.insert(mesh_.triangles.end(), piece.triangles.begin(), piece.triangles.end());
   }
 
   static std::vector<std::uint8_t> pngOf(const RayPicture& picture, double brightness) {

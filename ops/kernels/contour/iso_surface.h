@@ -20,6 +20,9 @@ struct SurfacePiece {
   std::uint32_t open_from = 0;
 };
 
+/// Adds `piece` to a mesh of those before it.
+void append(Mesh& mesh, const SurfacePiece& piece);
+
 /// The surface of voxels, or of a scalar field at a level, by marching cubes, layer by layer.
 ///
 /// The mesh is a closed manifold that faces outwards: every side of a triangle is met by exactly
@@ -82,7 +85,12 @@ class IsoSurface {
 
   SurfacePiece addBits(std::vector<BitLayer> bits, ZRange layers);
   void march(std::vector<Step>& steps, SurfacePiece& piece);
+  void findCuts(Step& step, int row) const;
+  void number(std::vector<Step>& steps, SurfacePiece& piece);
+  void emitTriangles(const Step& step, int row, SurfacePiece& piece) const;
   void emitVertices(const Step& step, int row, Values& values, SurfacePiece& piece) const;
+  template <typename Work>
+  void forSomeRows(const std::vector<Step>& steps, const Work& work) const;
   template <typename Visit>
   void forEachCell(const Step& step, int row, const Visit& visit) const;
 

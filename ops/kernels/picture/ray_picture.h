@@ -70,6 +70,7 @@ class RayScene {
 
  private:
   struct Rays;
+  class Painter;
   std::unique_ptr<Rays> rays_;
 };
 
