@@ -20,7 +20,7 @@ namespace {
 using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree>;
 using Leaf = Int32Tree::LeafNodeType;
 
-/// Tiles of what is inside a part alone; a later call yields to what an earlier one left.
+/// Fills the tiles inside a part, except where an earlier call has filled.
 void fillInterior(const FloatGrid& surface, int part, Int32Tree& parts) {
   for (auto tile = surface.tree().cbeginValueOff(); tile; ++tile) {
     if (tile.isVoxelValue() || !(*tile < 0)) continue;
