@@ -23,8 +23,8 @@ double areaOf(const Mesh& mesh);
 /// Returns the enclosed volume, mm³; positive where the triangles face outwards.
 double volumeOf(const Mesh& mesh);
 
-/// Returns the share of one triangle in that volume: mm³ between it and the point `from`, which
-/// must be the same for all triangles.
+/// Returns the share of one triangle in that volume, mm³: the signed volume between it and the
+/// point `from`, which must be the same for all triangles.
 inline double volumeFrom(const openvdb::Vec3d& from, const Mesh& mesh, const Mesh::Triangle& t) {
   const openvdb::Vec3d a = mesh.vertices[t[0]] - from;
   const openvdb::Vec3d b = mesh.vertices[t[1]] - from;

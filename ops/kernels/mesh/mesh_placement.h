@@ -12,29 +12,29 @@
 
 namespace vdbdither {
 
-/// `meshes` in one, one after the other.
+/// Returns `meshes` as one mesh, one after the other.
 Mesh joined(std::vector<Mesh> meshes);
 
-/// How a mesh comes to where it is printed.
+/// The place of a mesh in the printer.
 struct MeshPlacement {
   openvdb::Vec3d rotate_degrees{0, 0, 0};  ///< about x, then y, then z; quarter turns are exact
-  double factor = 1;                       ///< mm in a unit of the file
-  double fit_mm = 0;                       ///< the longest axis, in place of the factor, if not 0
-  bool on_bed = false;                     ///< the bounding box then begins at the origin
+  double factor = 1;                       ///< mm per unit of the file
+  double fit_mm = 0;    ///< the length of the longest axis; replaces the factor if not 0
+  bool on_bed = false;  ///< moves the bounding box to begin at the origin
 };
 
-/// Turns, scales, then moves meshes as one. Throws DataError where meshes without extent have to
-/// fit.
+/// Rotates, scales, then moves meshes as one. Throws DataError if `fit_mm` is set and the meshes
+/// have no extent.
 void place(std::span<Mesh> meshes, const MeshPlacement& placement);
 inline void place(Mesh& mesh, const MeshPlacement& placement) {
   place(std::span(&mesh, 1), placement);
 }
 
-/// The units that a mesh's numbers can be in, and mm in each.
+/// The units of a mesh file, and mm per unit.
 inline constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{
     {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}, {"um", 0.001}}};
 
-/// Mm in `unit`, one of them.
+/// Returns mm per `unit`, which must be one of them.
 double unitMm(std::string_view unit);
 
 }  // namespace vdbdither

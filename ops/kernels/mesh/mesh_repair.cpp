@@ -1,5 +1,5 @@
-// Whatever the triangles are, the sides that nothing meets from the other side form closed loops.
-// Filling these makes the mesh a cycle, for which the winding number is whole.
+// In any set of triangles the sides that no opposite side meets form closed loops. Filling the
+// loops makes the mesh a cycle, whose winding number is a whole number everywhere.
 
 #include "ops/kernels/mesh/mesh_repair.h"
 
@@ -29,7 +29,7 @@ constexpr double weld_mm = 1e-3;
 
 using Triangle = Mesh::Triangle;
 
-/// Renumbers the corners and drops the triangles that lost one.
+/// Renumbers the corners and drops the triangles of which two became the same.
 void renumber(DerivedMesh& made, const std::vector<std::uint32_t>& to, MeshRepairs& repairs) {
   std::vector<Triangle>& triangles = made.mesh.triangles;
   for (Triangle& t : triangles)
@@ -59,7 +59,7 @@ void weldEqual(DerivedMesh& made, MeshRepairs& repairs) {
   renumber(made, to, repairs);
 }
 
-/// Directed sides that no opposite one cancels, each with its surplus.
+/// A directed side that opposite sides do not cancel, and its surplus.
 struct Border {
   std::uint32_t from, to;
   int count;
@@ -118,8 +118,8 @@ void weldBorders(DerivedMesh& made, MeshRepairs& repairs) {
 }
 
 /// Of triangles with the same corners one stays. Two that face opposite ways are a wall between two
-/// solids and both go, unless most of the mesh is like that: then it is a surface with two sides,
-/// and one stays.
+/// solids; both are dropped, unless most of the mesh consists of such pairs: then it is a two-sided
+/// surface, and one of each pair stays.
 void dropDuplicates(DerivedMesh& made, MeshRepairs& repairs) {
   const Mesh& mesh = made.mesh;
   struct Corners {
@@ -159,7 +159,8 @@ void dropDuplicates(DerivedMesh& made, MeshRepairs& repairs) {
   repairs.duplicate_triangles += before - mesh.triangles.size();
 }
 
-/// Turns triangles to agree across the edges where two meet. Returns the part of every triangle.
+/// Turns triangles to agree across the edges at which two meet. Returns the part of every triangle:
+/// those connected by such edges.
 std::vector<std::uint32_t> orient(Mesh& mesh, MeshRepairs& repairs) {
   const MeshEdges edges(mesh);
   const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
@@ -243,10 +244,10 @@ void turnInsideOut(Mesh& mesh, const std::vector<std::uint32_t>& part, MeshRepai
   }
 }
 
-/// The loops that the borders form, taken apart wherever they touch themselves.
+/// Returns the loops of the borders, split wherever they touch themselves.
 std::vector<HoleLoop> holesOf(const Mesh& mesh, MeshRepairs& repairs) {
   std::vector<HoleLoop> loops;
-  std::map<std::uint32_t, std::vector<std::uint32_t>> next;  // against the borders
+  std::map<std::uint32_t, std::vector<std::uint32_t>> next;  // directed against the borders
   for (const Border& border : bordersOf(mesh, MeshEdges(mesh))) {
     repairs.boundary_edges += static_cast<std::uint64_t>(border.count);
     next[border.to].insert(next[border.to].end(), static_cast<std::size_t>(border.count),

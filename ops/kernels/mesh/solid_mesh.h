@@ -1,5 +1,7 @@
 #pragma once
 
+// The mesh family: kernels on triangle meshes; placing, measuring, repairing and closing them.
+
 #include <cstdint>
 #include <functional>
 #include <string>

@@ -15,7 +15,7 @@ namespace {
 
 /// The neighbours of every vertex, in the order of the triangles.
 struct Neighbours {
-  std::vector<std::uint32_t> first;  ///< by vertex, and the end of the last
+  std::vector<std::uint32_t> first;  ///< by vertex; one more entry ends the last
   std::vector<std::uint32_t> vertices;
 
   explicit Neighbours(const Mesh& mesh)
