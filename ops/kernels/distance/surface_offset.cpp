@@ -26,7 +26,7 @@ namespace {
 
 using Accessor = openvdb::tree::ValueAccessor<const FloatTree, false>;
 
-/// h at a voxel or at a point. For one thread.
+/// Reads h at a voxel or at a point, for one thread.
 class Heights {
  public:
   Heights(const SurfaceOffset& offset, const FloatGrid* grid, std::atomic<float>& greatest)
@@ -42,7 +42,7 @@ class Heights {
 
   double at(const Coord& ijk) { return at(ijk, offset_.lattice.position(ijk)); }
 
-  /// At a point in the voxel `ijk`.
+  /// Returns h at a point in the voxel `ijk`.
   double at(const Coord& ijk, const Vec3d& position_mm) {
     double height_mm = offset_.constant_mm;
     if (offset_.map) height_mm += offset_.map->at(position_mm);
@@ -62,7 +62,7 @@ class Heights {
   float seen_ = 0;
 };
 
-/// h on ∂V, active at its voxels.
+/// Returns h on ∂V, active at its voxels.
 FloatTree surfaceHeights(const SurfaceOffset& offset, const FloatTree& surface,
                          const FloatGrid* grid, ZRange layers, ZRange valid,
                          std::atomic<float>& greatest) {
@@ -114,7 +114,7 @@ FloatGrid::Ptr SurfaceOffset::run(const FloatGrid& surface, const FloatGrid* hei
   std::vector<LeafValues> leaves(sources.size());
   std::atomic<float> greatest = 0;
 
-  /// `make_reader()` makes for one thread a function from a leaf, an offset and d to h.
+  /// `make_reader()` returns, for one thread, a function from a leaf, an offset and d to h.
   const auto displace = [&](const auto& make_reader) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {
       const Accessor accessor(surface.tree());
