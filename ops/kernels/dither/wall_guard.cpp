@@ -11,7 +11,8 @@ using openvdb::Coord;
 
 namespace {
 
-/// A surface that bends more is not one sheet to a voxel: its edges and wires stay as they are.
+/// A surface of a smaller radius does not count as a single sheet; its edges and wires do not
+/// change.
 constexpr double least_radius_mm = 0.3;
 
 }  // namespace
@@ -31,7 +32,7 @@ bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsi
   Coord outward(0);
   double rise_all_mm = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    // What a flat facet's normal has of rounding errors is no direction.
+    // Ignores components that are rounding errors of a flat facet's normal.
     if (rise_mm[axis] < 1e-3 * highest_mm) continue;
     outward[axis] = normal[axis] > 0 ? 1 : -1;
     rise_all_mm += rise_mm[axis];
@@ -42,7 +43,7 @@ bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsi
   const int own = d_mm < 0 ? -1 : 1;  // the side that the voxel lies on
   using At = LeafSurroundings;
   const float* here = around.at(offset);
-  // How far a voxel is from the surface, on the given side of it.
+  // The distance of a voxel from the surface, positive on the given side.
   const auto sample = [&](int side, const Coord& step) {
     const int farthest = std::max({std::abs(step.x()), std::abs(step.y()), std::abs(step.z())});
     const double d =
@@ -52,8 +53,8 @@ bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsi
     return std::clamp(side * d, -band_mm, band_mm);
   };
 
-  // T on its own side, one step further in, then across the face, as many steps as it takes to tell
-  // thick from thin.
+  // T on the voxel's own side, one step further in; then across the face, by the steps that are
+  // needed to tell thick from thin.
   const int steps = 1 + static_cast<int>(1.5 * depth_mm / rise_all_mm + 0.95);
   const auto outward_by = [&](int n) {
     return Coord(n * outward.x(), n * outward.y(), n * outward.z());
