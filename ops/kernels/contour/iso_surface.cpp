@@ -27,7 +27,7 @@ using RowsOfSteps = tbb::blocked_range<int>;
 constexpr int word_bits = 64;
 constexpr double minimum_share = 1.0 / 256;
 
-/// The word whose bit n is bit n + 1 of a row.
+/// Returns the word whose bit n is bit n + 1 of a row.
 std::uint64_t shiftedDown(const std::uint64_t* row, int word, int words) {
   const std::uint64_t next = word + 1 < words ? row[word + 1] : 0;
   return row[word] >> 1 | next << (word_bits - 1);
@@ -67,7 +67,7 @@ class IsoSurface::Values {
     if (surface.here_) here_.emplace(surface.here_->getConstAccessor());
   }
 
-  /// How far along the line from `from` one step along `axis` the surface lies, 0 … 1.
+  /// Returns where the surface cuts the line from `from` to its neighbour along `axis`, 0 … 1.
   double share(const Coord& from, int axis) {
     if (!surface_.is_field_) return 0.5;
     Coord to = from;
@@ -143,7 +143,7 @@ SurfacePiece IsoSurface::addBits(std::vector<BitLayer> bits, ZRange layers) {
   }
   here_layers_ = layers;
   next_layer_ = layers.end;
-  // A few layers at a time, so that what is kept of each stays small.
+  // A few layers at a time, to limit the memory.
   for (std::size_t begin = 0; begin < bits.size(); begin += leaf_layers) {
     const std::size_t end = std::min(bits.size(), begin + leaf_layers);
     std::vector<Layer> made(end - begin);
@@ -161,7 +161,7 @@ SurfacePiece IsoSurface::addBits(std::vector<BitLayer> bits, ZRange layers) {
   return piece;
 }
 
-/// Calls visit(x, case) for the cells between a row and the next that the surface passes, in rising
+/// Calls visit(x, case) for the cells that the surface passes between a row and the next, in rising
 /// x.
 template <typename Visit>
 void IsoSurface::forEachCell(const Step& step, int row, const Visit& visit) const {
@@ -221,7 +221,7 @@ void IsoSurface::march(std::vector<Step>& steps, SurfacePiece& piece) {
   });
 }
 
-/// Finds the lines of a row that are cut, and counts them by word, and its triangles.
+/// Finds the cut lines of a row, counts them by word, and counts its triangles.
 void IsoSurface::findCuts(Step& step, int row) const {
   const int words = frame_.words();
   const std::size_t begin = frame_.row(row);
@@ -242,7 +242,7 @@ void IsoSurface::findCuts(Step& step, int row) const {
   });
 }
 
-/// Turns counts of cut lines and triangles into the numbers of the first, and makes room for them.
+/// Turns counts of cut lines and of triangles into the indices of the first, and resizes the piece.
 void IsoSurface::number(std::vector<Step>& steps, SurfacePiece& piece) {
   std::uint64_t vertices = vertex_count_;
   std::size_t triangles = piece.triangles.size();
@@ -271,7 +271,7 @@ void IsoSurface::number(std::vector<Step>& steps, SurfacePiece& piece) {
   piece.open_from = steps.back().first_of_upper;
 }
 
-/// The vertices on the lines of a row.
+/// Writes the vertices on the lines of a row.
 void IsoSurface::emitVertices(const Step& step, int row, Values& values,
                               SurfacePiece& piece) const {
   const std::uint32_t piece_begin =
@@ -293,7 +293,7 @@ void IsoSurface::emitVertices(const Step& step, int row, Values& values,
   emit(step.upper->along_y, step.z + 1, 1);
 }
 
-/// The triangles of the cells between a row and the next.
+/// Writes the triangles of the cells between a row and the next.
 void IsoSurface::emitTriangles(const Step& step, int row, SurfacePiece& piece) const {
   std::size_t next = step.first_triangle[static_cast<std::size_t>(row)];
   forEachCell(step, row, [&](int x, const CubeCase& cube) {
