@@ -33,7 +33,7 @@ struct RoughnessRules {
   std::size_t maximum_facets = 64;  ///< the largest are kept
 };
 
-/// The roughness of the reference's facets, largest first.
+/// Returns the roughness of the reference's facets, largest first.
 std::vector<FacetRoughness> facetRoughness(const SurfaceErrors& errors,
                                            const ClosestPoints& reference,
                                            const RoughnessRules& rules);

@@ -21,7 +21,7 @@ Vec3d asVector(const T& value) {
   }
 }
 
-/// Takes values in, one after the other.
+/// Adds values one by one.
 class Collector {
  public:
   explicit Collector(GridSummary& summary) : summary_(summary) {}
@@ -34,7 +34,7 @@ class Collector {
     summary_.greatest = first ? at : openvdb::math::maxComponent(summary_.greatest, at);
     summary_.active_voxels += voxels;
     if constexpr (std::is_same_v<Value, std::int32_t>) {
-      // Neighbours mostly agree, which spares the search.
+      // Consecutive values are mostly equal, which avoids the search.
       if (!count_ || count_->first != value) count_ = &*summary_.counts.try_emplace(value).first;
       count_->second += voxels;
     }

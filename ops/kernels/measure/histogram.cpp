@@ -32,7 +32,7 @@ void Histogram::add(double value, std::uint64_t count) {
 }
 
 void Histogram::widen() {
-  // The shift rounds down, below zero too.
+  // The shift rounds down, also below zero.
   const std::int64_t first = first_ >> 1;
   std::vector<std::uint64_t> counts(
       static_cast<std::size_t>(((first_ + std::ssize(counts_) - 1) >> 1) - first + 1), 0);
