@@ -47,8 +47,8 @@ std::uint32_t scrambled(std::uint32_t x, std::uint32_t seed) {
   return reversed(x);
 }
 
-/// Point `index` of the first two dimensions of Sobol's sequence, shuffled and scrambled: two
-/// numbers in [0, 1).
+/// Returns point `index` of the first two dimensions of the Sobol sequence, shuffled and scrambled:
+/// two numbers in [0, 1).
 std::array<double, 2> patternPoint(std::uint32_t index, std::uint32_t seed) {
   index = scrambled(index, seed);
   std::uint32_t second = 0;
@@ -67,13 +67,13 @@ struct Lamp {
   Vec3d centre;
   Vec3d facing;         ///< unit
   Vec3d across, along;  ///< sides, mm
-  double radiance = 0;  ///< so that what it gives to the target is as wanted
+  double radiance = 0;  ///< scaled to the irradiance at the target
 
   [[nodiscard]] Vec3d at(const std::array<double, 2>& place) const {
     return centre + (place[0] - 0.5) * across + (place[1] - 0.5) * along;
   }
 
-  /// What a whole lamp around `place` would give to an open surface at `p`.
+  /// Returns the irradiance of an unobstructed surface at `p` if all of the lamp were at `place`.
   [[nodiscard]] double given(const Vec3d& place, const Vec3d& p, const Vec3d& normal) const {
     const Vec3d way = place - p;
     const double distance_2 = way.lengthSqr();
@@ -87,11 +87,11 @@ struct Lamp {
 
 struct Lighting {
   std::optional<Lamp> lamp;
-  double lamp_share = 0;  ///< of what a horizontal open place gets
+  double lamp_share = 0;  ///< of the irradiance of an unobstructed horizontal surface
   double sky_share = 0;
 };
 
-/// Scaled so that a horizontal surface at the target gets 1.
+/// Returns a lamp scaled so that a horizontal surface at the target gets 1.
 Lamp lampFrom(const Vec3d& target, double azimuth_degrees, double elevation_degrees, double side_mm,
               double distance_mm) {
   const double azimuth = radians(azimuth_degrees);
@@ -124,11 +124,11 @@ Lighting lightingOf(Look look, const Camera& camera) {
   return {};
 }
 
-/// A direction about `normal`, as dense as its cosine.
+/// Returns a direction about `normal`, with a density proportional to its cosine.
 Vec3d matt(const Vec3d& normal, const std::array<double, 2>& at) {
   const double angle = 2 * std::numbers::pi * at[0];
   const double radius = std::sqrt(at[1]);
-  // One axis is horizontal: the horizon then cuts the pattern alike for neighbouring normals.
+  // One axis is horizontal, so that the horizon cuts the pattern similarly for similar normals.
   Vec3d first(-normal.y(), normal.x(), 0);
   if (!first.normalize(1e-12)) first = Vec3d(1, 0, 0);
   const Vec3d second = normal.cross(first);
@@ -136,7 +136,7 @@ Vec3d matt(const Vec3d& normal, const std::array<double, 2>& at) {
          std::sqrt(std::max(0.0, 1 - at[1])) * normal;
 }
 
-/// Of all hits that it is offered, the nearest, and of those the lowest triangle.
+/// Keeps the nearest of all hits, and of equally near ones the lowest triangle.
 struct NearestContext {
   RTCIntersectContext context;
   float distance;
@@ -218,8 +218,8 @@ void frame(Camera& camera, const Mesh& mesh, int margin) {
 struct RayScene::Rays {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
-  Vec3d centre;          ///< of the mesh, where the scene has its origin
-  double radius_mm = 0;  ///< of a sphere around all of it
+  Vec3d centre;          ///< of the mesh, the origin of the scene
+  double radius_mm = 0;  ///< of a sphere around the mesh
   const float* vertices = nullptr;
   const std::uint32_t* triangles = nullptr;
 
@@ -236,9 +236,9 @@ struct RayScene::Rays {
     return {at[0], at[1], at[2]};
   }
 
-  /// The triangle that a ray meets first, or none. Embree finds where; of triangles that meet
-  /// there, which one it names depends on how its threads built the tree, so that all hits in a
-  /// thin shell are asked for again.
+  /// Returns the triangle that a ray meets first, or nothing. Embree finds the place; but which of
+  /// several triangles there it reports depends on how its threads have built the tree, so that all
+  /// hits in a thin shell are queried again.
   [[nodiscard]] std::optional<std::uint32_t> met(const Vec3d& origin, const Vec3d& direction,
                                                  float far) const {
     NearestContext context{};
@@ -345,7 +345,7 @@ class RayScene::Painter {
   double radius_;
 };
 
-/// The light that an open place gets, from samples of the lamp and of the sky.
+/// Returns the light at a point of the surface, from one sample of the lamp and one of the sky.
 double RayScene::Painter::lightAt(const Vec3d& p, const Vec3d& normal, std::uint32_t sample,
                                   std::uint32_t pattern) const {
   double light = 0;
@@ -366,8 +366,8 @@ double RayScene::Painter::lightAt(const Vec3d& p, const Vec3d& normal, std::uint
   return light;
 }
 
-/// The ray through a place of the picture, from where it enters the sphere around the mesh, where
-/// coordinates are small; none where it misses the sphere.
+/// Returns the ray through a place of the picture, or nothing if it misses the sphere around the
+/// mesh. It begins where it enters the sphere, so that coordinates are small.
 std::optional<RayScene::Painter::Ray> RayScene::Painter::rayThrough(int column, double dx, int row,
                                                                     double dy) const {
   const auto& [right, up, towards] = axes_;
