@@ -1,3 +1,6 @@
+// Lorensen, Cline: "Marching Cubes: A High Resolution 3D Surface Construction Algorithm",
+// SIGGRAPH 1987.
+
 #include "ops/kernels/contour/marching_cubes.h"
 
 #include <limits>

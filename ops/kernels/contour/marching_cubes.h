@@ -6,7 +6,7 @@
 
 namespace vdbdither {
 
-/// The surface in one cell whose corners are inside or outside (Lorensen, Cline: "Marching Cubes",
+/// The surface in one cell whose corners are inside or outside (marching cubes, Lorensen, Cline
 /// 1987). Corner (x, y, z) is number x + 2y + 4z; edges 0–3 lie along x (y + 2z), 4–7 along y (x +
 /// 2z), 8–11 along z (x + 2y).
 struct CubeCase {

@@ -1,3 +1,5 @@
+// Gibson: "Constrained elastic surface nets", MICCAI 1998.
+
 #include "ops/kernels/contour/zero_set.h"
 
 #include <algorithm>

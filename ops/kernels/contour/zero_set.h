@@ -42,10 +42,10 @@ class ZeroSet {
   [[nodiscard]] double cells() const { return cells_; }
   [[nodiscard]] double memoryBytes() const;
 
-  /// Returns the surface as a mesh that faces outwards, by surface nets (S. Gibson, "Constrained
-  /// elastic surface nets", 1998): one vertex in each division that the surface passes, moved onto
-  /// it. The mesh contains every triangle that meets [low, high] mm along z, and some beyond, where
-  /// it ends open. The triangles within and their order depend on the grid alone.
+  /// Returns the surface as a mesh that faces outwards, by surface nets (Gibson 1998): one vertex
+  /// in each division that the surface passes, moved onto it. The mesh contains every triangle that
+  /// meets [low, high] mm along z, and some beyond, where it ends open. The triangles within and
+  /// their order depend on the grid alone.
   [[nodiscard]] Mesh triangles(double low_mm, double high_mm) const;
 
   /// Refines distances to the mesh to distances to the interpolant. For one thread.

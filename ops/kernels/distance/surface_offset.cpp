@@ -1,3 +1,6 @@
+// Brunton, Abu Rmaileh: "Displaced signed distance fields for additive manufacturing", ACM
+// Transactions on Graphics 40(4), 2021.
+
 #include "ops/kernels/distance/surface_offset.h"
 
 #include <algorithm>

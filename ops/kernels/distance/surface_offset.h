@@ -9,10 +9,9 @@
 
 namespace vdbdither {
 
-/// A displaced distance field (A. Brunton, L. Abu Rmaileh, "Displaced signed distance fields for
-/// additive manufacturing", ACM TOG 40(4), 2021): d′(v) = d(v) − h, where h is the height at the
-/// point of the surface that v belongs to, positive outwards. With h = −f and the point at v̄ this
-/// is eq. (3) of shape dithering (Morsy, Brunton, Urban 2022).
+/// A displaced distance field (Brunton, Abu Rmaileh 2021): d′(v) = d(v) − h, where h is the height
+/// at the point of the surface that v belongs to, positive outwards. With h = −f and the point at
+/// v̄ this is eq. (3) of shape dithering (Morsy, Brunton, Urban 2022).
 ///
 /// Where h is constant, d′ is a distance: exact outside a growing part, and too small behind its
 /// re-entrant edges, as that of a union is. Where h varies, |∇d′| is √(1 + |∇h|²).

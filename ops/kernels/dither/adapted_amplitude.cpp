@@ -1,3 +1,6 @@
+// The displacement and its constant are eq. (5) of Morsy, Brunton, Urban: Shape Dithering for 3D
+// Printing, ACM Transactions on Graphics 41(4), 2022. docs/evaluation.md has the measurements.
+
 #include "ops/kernels/dither/adapted_amplitude.h"
 
 #include <algorithm>

@@ -1,3 +1,6 @@
+// Eq. (11) of Morsy, Brunton, Urban: Shape Dithering for 3D Printing, ACM Transactions on
+// Graphics 41(4), 2022.
+
 #include "ops/kernels/dither/interlace.h"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Perlin: "Improving Noise", SIGGRAPH 2002.
+
 #include "ops/kernels/mask/gradient_noise.h"
 
 #include <algorithm>

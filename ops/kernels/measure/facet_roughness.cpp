@@ -1,3 +1,5 @@
+// Sa and Sq: ISO 25178-2. The Gaussian filter: ISO 16610-61.
+
 #include "ops/kernels/measure/facet_roughness.h"
 
 #include <algorithm>

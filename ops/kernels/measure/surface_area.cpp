@@ -1,3 +1,6 @@
+// Marching tetrahedra: Doi, Koide: "An Efficient Method of Triangulating Equi-Valued Surfaces by
+// Using Tetrahedral Cells", IEICE Transactions E74(1), 1991.
+
 #include "ops/kernels/measure/surface_area.h"
 
 #include <array>

@@ -1,3 +1,7 @@
+// The nearest point of a triangle: Ericson: "Real-Time Collision Detection", 2005, section
+// 5.1.5. The sign: Bærentzen, Aanæs: "Signed Distance Computation Using the Angle Weighted
+// Pseudonormal", IEEE Transactions on Visualization and Computer Graphics 11(3), 2005.
+
 #include "ops/kernels/mesh/closest_point.h"
 
 #include <algorithm>

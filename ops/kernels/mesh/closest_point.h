@@ -26,8 +26,7 @@ struct PointOnTriangle {
   }
 };
 
-/// Returns the point of the triangle a, b, c nearest to p (Ericson: "Real-Time Collision
-/// Detection", 2005, 5.1.5).
+/// Returns the point of the triangle a, b, c nearest to p (Ericson 2005, 5.1.5).
 PointOnTriangle nearestOnTriangle(const openvdb::Vec3d& a, const openvdb::Vec3d& b,
                                   const openvdb::Vec3d& c, const openvdb::Vec3d& p);
 
@@ -40,10 +39,9 @@ struct ClosestPoint {
 
 /// Exact signed distances from any point to a closed mesh, through a tree of bounding boxes.
 ///
-/// The sign is that of the angle-weighted normal at the nearest point (Bærentzen, Aanæs: "Signed
-/// Distance Computation Using the Angle Weighted Pseudonormal", 2005), which is right for every
-/// closed mesh that does not intersect itself. In double precision; the result depends on the mesh
-/// and the point alone.
+/// The sign is that of the angle-weighted normal at the nearest point (Bærentzen, Aanæs 2005),
+/// which is right for every closed mesh that does not intersect itself. In double precision; the
+/// result depends on the mesh and the point alone.
 class ClosestPoints {
  public:
   /// `mesh` in mm, closed and facing outwards, with at least one triangle; see solidMesh.

@@ -1,6 +1,9 @@
 // A filling is inflated like a balloon: its corners move outwards where the number is above ½ and
 // inwards where it is below, and its sides are cut until their middles need not move. Wherever a
 // corner stops, everything it has passed is on the right side.
+//
+// Triangles of minimum area: Barequet, Sharir: "Filling gaps in the boundary of a polyhedron",
+// Computer Aided Geometric Design 12(2), 1995. The winding number: see winding_number.cpp.
 
 #include "ops/kernels/mesh/hole_filling.h"
 
@@ -65,9 +68,8 @@ Vec3d areaOf(const Mesh& mesh, const Triangle& t) {
   return 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
 }
 
-/// Fills a loop with the triangles between its corners that have the minimum area (Barequet,
-/// Sharir: "Filling gaps in the boundary of a polyhedron", 1995), or with a fan if there are too
-/// many corners.
+/// Fills a loop with the triangles between its corners that have the minimum area (Barequet, Sharir
+/// 1995), or with a fan if there are too many corners.
 void fillWithLeastArea(Mesh& mesh, const HoleLoop& loop) {
   const std::size_t count = loop.size();
   constexpr std::size_t most_corners = 500;

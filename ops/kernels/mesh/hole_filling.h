@@ -16,12 +16,11 @@ using HoleLoop = std::vector<std::uint32_t>;
 /// triangle, others a fan about their centre.
 void fillWithFans(Mesh& mesh, std::span<const HoleLoop> loops);
 
-/// Fills holes along the surface on which the generalized winding number of the open mesh
-/// (Jacobson, Kavan, Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding
-/// numbers", 2013) is one half: a fan that would miss this surface is cut into smaller triangles
-/// whose inner corners lie on it. Sides of `loops` are never cut. Where the number stays above one
-/// half from the hole up to another part, as between two halves that hardly touch, the filling
-/// reaches into that part.
+/// Fills holes along the surface on which the generalized winding number of the open mesh (Jacobson
+/// et al. 2013) is one half: a fan that would miss this surface is cut into smaller triangles whose
+/// inner corners lie on it. Sides of `loops` are never cut. Where the number stays above one half
+/// from the hole up to another part, as between two halves that hardly touch, the filling reaches
+/// into that part.
 ///
 /// The volume between fillings and surface is less than a thousandth of the solid's, mostly far
 /// less. Holes that are too small to matter, flat or within the solid keep their fan, and so do

@@ -1,3 +1,5 @@
+// Taubin: "A Signal Processing Approach to Fair Surface Design", SIGGRAPH 1995.
+
 #include "ops/kernels/mesh/taubin.h"
 
 #include <cstddef>

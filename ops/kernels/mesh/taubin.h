@@ -6,9 +6,8 @@
 
 namespace vdbdither {
 
-/// Taubin's smoothing (Taubin: "A Signal Processing Approach to Fair Surface Design", 1995): each
-/// iteration moves all vertices by λ, then by μ of the way to the mean of their neighbours. The
-/// same as MeshLab's filter.
+/// Taubin's smoothing (1995): each iteration moves all vertices by λ, then by μ of the way to the
+/// mean of their neighbours. The same as MeshLab's filter.
 struct Taubin {
   double lambda = 0.5;
   double mu = -0.53;

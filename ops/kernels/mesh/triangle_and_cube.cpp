@@ -1,3 +1,5 @@
+// Akenine-Möller: "Fast 3D triangle-box overlap testing", Journal of Graphics Tools 6(1), 2001.
+
 #include "ops/kernels/mesh/triangle_and_cube.h"
 
 #include <algorithm>

@@ -1,3 +1,10 @@
+// The solid angle of a triangle: van Oosterom, Strackee: "The Solid Angle of a Plane Triangle",
+// IEEE Transactions on Biomedical Engineering 30(2), 1983. The winding number: Jacobson, Kavan,
+// Sorkine-Hornung: "Robust inside-outside segmentation using generalized winding numbers", ACM
+// Transactions on Graphics 32(4), 2013. Groups of triangles: Barill, Dickson, Schmidt, Levin,
+// Jacobson: "Fast winding numbers for soups and clouds", ACM Transactions on Graphics 37(4),
+// 2018.
+
 #include "ops/kernels/mesh/winding_number.h"
 
 #include <algorithm>

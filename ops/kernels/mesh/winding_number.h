@@ -34,8 +34,7 @@ inline std::array<openvdb::Vec3d, 3> cornersOf(const Mesh& mesh, std::uint32_t t
 /// 1 inside a closed surface and 0 outside, ½ on it; fractions where it is open.
 ///
 /// Groups of triangles far from a point count as a dipole with its first and second derivatives
-/// (Barill et al., "Fast winding numbers for soups and clouds", 2018); near triangles count one by
-/// one.
+/// (Barill et al. 2018); near triangles count one by one.
 class WindingNumber {
  public:
   /// Keeps a reference to `mesh`.

@@ -15,8 +15,7 @@ struct WindingSurface : DerivedMesh {
 };
 
 /// Returns the surface of the solid in which the generalized winding number of any set of triangles
-/// exceeds ½ (Jacobson, Kavan, Sorkine-Hornung: "Robust inside-outside segmentation using
-/// generalized winding numbers", 2013). It follows the triangles at which the number passes ½, and
+/// exceeds ½ (Jacobson et al. 2013). It follows the triangles at which the number passes ½, and
 /// between triangles the level ½. If the number is below −½ in more than twice the space in which
 /// it is above ½, the triangles are taken as facing inwards and are all turned.
 ///

@@ -1,3 +1,10 @@
+// SSIM: Wang, Bovik, Sheikh, Simoncelli: "Image Quality Assessment: From Error Visibility to
+// Structural Similarity", IEEE Transactions on Image Processing 13(4), 2004. Contrast
+// sensitivity: Mannos, Sakrison: "The Effects of a Visual Fidelity Criterion on the Encoding of
+// Images", IEEE Transactions on Information Theory 20(4), 1974. LDR-FLIP: Andersson, Nilsson,
+// Akenine-Möller, Oskarsson, Åström, Fairchild: "FLIP: A Difference Evaluator for Alternating
+// Images", Proceedings of the ACM on Computer Graphics and Interactive Techniques 3(2), 2020.
+
 #include "ops/kernels/picture/picture_similarity.h"
 
 #include <algorithm>

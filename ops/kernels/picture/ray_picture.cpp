@@ -1,3 +1,6 @@
+// Burley: "Practical Hash-based Owen Scrambling", Journal of Computer Graphics Techniques 9(4),
+// 2020.
+
 #include "ops/kernels/picture/ray_picture.h"
 
 #include <algorithm>

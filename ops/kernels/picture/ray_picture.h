@@ -63,9 +63,9 @@ class RayScene {
   RayScene& operator=(const RayScene&) = delete;
 
   /// Returns the picture, which depends on the arguments and the mesh alone: every pixel has its
-  /// own pattern, an Owen-scrambled Sobol sequence (Burley: "Practical Hash-based Owen Scrambling",
-  /// 2020), scrambled by its place and `seed`; and of triangles that a ray meets at the same place
-  /// the one with the lowest index counts.
+  /// own pattern, an Owen-scrambled Sobol sequence (Burley 2020), scrambled by its place and
+  /// `seed`; and of triangles that a ray meets at the same place the one with the lowest index
+  /// counts.
   [[nodiscard]] RayPicture picture(const Camera& camera, Look look, int samples, std::uint32_t seed,
                                    const std::function<void(double)>& progress) const;
 
