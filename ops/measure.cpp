@@ -36,7 +36,7 @@ ordered_json json(const ErrorStatistics& statistics) {
                       {"mean_mm", statistics.mean_mm},       {"rms_mm", statistics.rms_mm},
                       {"p50_mm", statistics.percentile(50)}, {"p90_mm", statistics.percentile(90)},
                       {"p95_mm", statistics.percentile(95)}, {"p99_mm", statistics.percentile(99)},
-                      {"max_mm", statistics.most_mm}};
+                      {"max_mm", statistics.maximum_mm}};
   for (int percent = 0; percent <= 100; ++percent)
     result["cumulative_mm"].push_back(statistics.percentile(percent));
   return result;

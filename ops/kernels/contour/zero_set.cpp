@@ -36,14 +36,14 @@ struct Cell {
   /// of them.
   [[nodiscard]] bool maybeCrossed() const {
     if (!uniform()) return true;
-    double most = 0;
+    double bend = 0;
     for (const auto& along : bend) {
-      double greatest = 0;
-      for (const double b : along) greatest = std::max(greatest, std::abs(b));
-      most += greatest / 8;
+      double maximum = 0;
+      for (const double b : along) maximum = std::max(maximum, std::abs(b));
+      bend += maximum / 8;
     }
     return std::any_of(value.begin(), value.end(),
-                       [&](double v) { return std::abs(v) <= most * (1 + 1e-9); });
+                       [&](double v) { return std::abs(v) <= bend * (1 + 1e-9); });
   }
 
   struct Sample {
@@ -464,7 +464,7 @@ double ZeroSet::Feet::distanceMm(const Vec3d& position_mm, const Vec3d& foot_mm,
                                  double distance_mm) {
   // Each step multiplies the error by the distance divided by the surface's radius of curvature.
   constexpr int steps = 3;
-  const double most_mm = surface_.half_division_mm_;
+  const double maximum_mm = surface_.half_division_mm_;
   double better_mm = distance_mm;
   Vec3d foot = foot_mm;
   for (int step = 0; step < steps; ++step) {
@@ -480,7 +480,7 @@ double ZeroSet::Feet::distanceMm(const Vec3d& position_mm, const Vec3d& foot_mm,
     const Vec3d normal = slope / steepness;
     const double next_mm = normal.dot(position_mm - foot) + sample.value / steepness;
     // At a crease, or where the slope is zero, steps do not converge.
-    if (!(std::abs(next_mm - distance_mm) <= most_mm)) break;
+    if (!(std::abs(next_mm - distance_mm) <= maximum_mm)) break;
     better_mm = next_mm;
     foot = position_mm - normal * next_mm;
   }

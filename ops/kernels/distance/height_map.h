@@ -22,7 +22,7 @@ class HeightMap {
   [[nodiscard]] double at(const openvdb::Vec3d& position_mm) const;
 
   /// The minimum and the maximum height.
-  [[nodiscard]] double leastMm() const { return least_mm_; }
+  [[nodiscard]] double leastMm() const { return minimum_mm_; }
   [[nodiscard]] double greatestMm() const { return greatest_mm_; }
 
  private:
@@ -31,7 +31,7 @@ class HeightMap {
   int across_, up_;  ///< the axes
   double pixel_mm_;
   openvdb::Vec2d corner_mm_;
-  double least_mm_, greatest_mm_;
+  double minimum_mm_, greatest_mm_;
 };
 
 }  // namespace vdbdither

@@ -18,8 +18,9 @@ using openvdb::Vec3d;
 namespace {
 
 Band widened(const Band& band, const Vec3d& pitch_mm, double slack_mm) {
-  const double least_mm = std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
-  return band.mm > 0 ? Band{0, band.mm + slack_mm} : Band{band.diameters + slack_mm / least_mm, 0};
+  const double minimum_mm = std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
+  return band.mm > 0 ? Band{0, band.mm + slack_mm}
+                     : Band{band.diameters + slack_mm / minimum_mm, 0};
 }
 
 int chunkOf(int layer, int layers) { return (layer - (layer < 0 ? layers - 1 : 0)) / layers; }

@@ -52,7 +52,7 @@ constexpr double checkered_noise = 0.9;
 /// The maximum of cycles per voxel diameter, along the normal, up to which waves count; beyond,
 /// their height is below a hundredth of a diameter. High waves matter: on special slopes, such as 1
 /// in 6, one can be as long as the facet while the first stairs are blurred away.
-constexpr double most_cycles = 16;
+constexpr double maximum_cycles = 16;
 
 /// Errors below this share of a voxel's diameter count as none.
 constexpr double negligible_share = 0.01;
@@ -81,10 +81,10 @@ class Facet {
   }
 
   [[nodiscard]] FacetDither best() const {
-    std::array<double, blurs> least;
-    least.fill(std::numeric_limits<double>::infinity());
+    std::array<double, blurs> minimum;
+    minimum.fill(std::numeric_limits<double>::infinity());
     forEachAllowed([&](std::size_t n, const FacetDither&) {
-      for (int b = 0; b < blurs; ++b) least[b] = std::min(least[b], weighed(b, n));
+      for (int b = 0; b < blurs; ++b) minimum[b] = std::min(minimum[b], weighed(b, n));
     });
 
     FacetDither best;
@@ -92,7 +92,8 @@ class Facet {
     forEachAllowed([&](std::size_t n, const FacetDither& dither) {
       double excess = 0;
       for (int b = 0; b < blurs; ++b)
-        excess = std::max(excess, (weighed(b, n) + negligible_mm2_) / (least[b] + negligible_mm2_));
+        excess =
+            std::max(excess, (weighed(b, n) + negligible_mm2_) / (minimum[b] + negligible_mm2_));
       if (excess < best_excess) {
         best_excess = excess;
         best = dither;
@@ -136,7 +137,7 @@ class Facet {
     const int c = (axis + 2) % 3;
     const double cosine = std::abs(normal_[axis]);
     const double halves =
-        2 * pitch_mm_[axis] * (most_cycles / (2 * half_diameter_mm_) * cosine + reach);
+        2 * pitch_mm_[axis] * (maximum_cycles / (2 * half_diameter_mm_) * cosine + reach);
     // The span in which the layer at this index cuts the cylinder of that radius around the normal.
     struct Span {
       int first, last;
@@ -170,7 +171,7 @@ class Facet {
     const double lateral2 = lateral.lengthSqr();
     if (lateral2 * spread_mm_ * spread_mm_ > no_trace) return;
     const double cycles = std::abs(along) * 2 * half_diameter_mm_;
-    if (cycles < 1e-6 || cycles > most_cycles) return;
+    if (cycles < 1e-6 || cycles > maximum_cycles) return;
 
     double height_mm = 1 / (2 * pi * along);
     for (int axis = 0; axis < 3; ++axis) height_mm *= sinc(lateral[axis] * pitch_mm_[axis]);

@@ -141,17 +141,17 @@ FloatTree surfaceDisplacements(const ShapeDither& dither, const FloatTree& surfa
 
       if (!given) gradient.visit(leaf, bits);
       auto made = std::make_unique<FloatLeaf>(leaf.origin(), 0.0F);
-      float greatest = 0;
+      float maximum = 0;
       forEachBit(bits, [&](unsigned offset) {
         const Coord ijk = leaf.offsetToGlobalCoord(offset);
         const Vec3s normal = given                    ? given->getValue(ijk)
                              : leaf.isValueOn(offset) ? gradient.normal(offset)
                                                       : Vec3s(0.0F);
         const float f = displacement(dither, normal, ijk);
-        greatest = std::max(greatest, std::abs(f));
+        maximum = std::max(maximum, std::abs(f));
         made->setValueOn(offset, f);
       });
-      made->setTransientData(std::bit_cast<std::uint32_t>(greatest));
+      made->setTransientData(std::bit_cast<std::uint32_t>(maximum));
       return made;
     };
   });
@@ -167,12 +167,12 @@ class AtClosest {
       : closest_(displacements, disk) {}
 
   float visit(const FloatLeaf& leaf) {
-    float greatest = 0;
-    if (!closest_.visit(leaf.origin())) return greatest;
+    float maximum = 0;
+    if (!closest_.visit(leaf.origin())) return maximum;
     for (const FloatLeaf* near : closest_.leaves()) {
-      if (near) greatest = std::max(greatest, std::bit_cast<float>(near->transientData()));
+      if (near) maximum = std::max(maximum, std::bit_cast<float>(near->transientData()));
     }
-    return greatest;
+    return maximum;
   }
 
   static LeafBits overturnable(const LeafBits& undecided) { return undecided; }

@@ -13,7 +13,7 @@ namespace {
 
 /// A surface of a smaller radius does not count as a single sheet; its edges and wires do not
 /// change.
-constexpr double least_radius_mm = 0.3;
+constexpr double minimum_radius_mm = 0.3;
 
 }  // namespace
 
@@ -71,7 +71,7 @@ bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsi
         const openvdb::Vec3d to(pitch_mm_[0] * i, pitch_mm_[1] * j, pitch_mm_[2] * k);
         const double rise = openvdb::Vec3d(normal).dot(to);
         const double flat_mm = std::clamp(depth_mm + own * rise, -band_mm, band_mm);
-        const double bend_mm = (to.lengthSqr() - rise * rise) / (2 * least_radius_mm);
+        const double bend_mm = (to.lengthSqr() - rise * rise) / (2 * minimum_radius_mm);
         const double there_mm = sample(own, {i, j, k});
         if (std::min(flat_mm, there_mm) < half_diameter_mm &&
             std::abs(flat_mm - there_mm) > bend_mm + 0.02 * rise_all_mm)

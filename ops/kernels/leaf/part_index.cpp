@@ -42,12 +42,12 @@ void fillLeaf(Leaf& leaf, std::vector<Accessor>& surfaces) {
   for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
     const Coord ijk = leaf.offsetToGlobalCoord(n);
     int nearest = 0;
-    float least = std::numeric_limits<float>::infinity();
-    for (std::size_t part = 0; part < surfaces.size() && !(least < 0); ++part) {
+    float minimum = std::numeric_limits<float>::infinity();
+    for (std::size_t part = 0; part < surfaces.size() && !(minimum < 0); ++part) {
       float distance = 0;
       const bool active = surfaces[part].probeValue(ijk, distance);
-      if ((active || distance < 0) && distance < least) {
-        least = distance;
+      if ((active || distance < 0) && distance < minimum) {
+        minimum = distance;
         nearest = static_cast<int>(part) + 1;
       }
     }

@@ -252,7 +252,7 @@ std::vector<FacetSummary> summary(const SliceSpectra& spectra,
         const Bands raspd = facet.raspd(s);
         for (int band = 0; band < band_count; ++band) {
           of.mean[band] += normals[i].weight * raspd[band];
-          if (facet.white[band] >= 4) of.greatest[band] = std::max(of.greatest[band], raspd[band]);
+          if (facet.white[band] >= 4) of.maximum[band] = std::max(of.maximum[band], raspd[band]);
         }
         const double low = facet.low(s);
         of.low_mean += normals[i].weight * low;

@@ -88,7 +88,7 @@ class SliceSpectra {
 /// The RASPD of one mask over many facets.
 struct FacetSummary {
   Bands mean{};
-  Bands greatest{};  ///< maximum of each band over the facets with ≥ 4 frequencies in it
+  Bands maximum{};  ///< maximum of each band over the facets with ≥ 4 frequencies in it
   double low_mean = 0;
   double low_worst = 0;
   openvdb::Vec3d worst_normal{0, 0, 0};

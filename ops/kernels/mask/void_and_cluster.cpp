@@ -165,8 +165,8 @@ IntegerKernel<Energy> integerKernel(const VoidAndCluster& settings, const Bricks
                    d.z() < 0 ? d.z() + size.z() : d.z()},
                   size)];
             }
-            const auto [least, greatest] = std::minmax_element(brick.begin(), brick.end());
-            if ((*least == 0 && *greatest == 0) || (*least < 0) != negative) continue;
+            const auto [minimum, maximum] = std::minmax_element(brick.begin(), brick.end());
+            if ((*minimum == 0 && *maximum == 0) || (*minimum < 0) != negative) continue;
             centred.bricks.push_back({x, y, z});
             centred.weights.insert(centred.weights.end(), brick.begin(), brick.end());
           }
@@ -237,10 +237,10 @@ template <int sign, std::size_t fixed, class Energy>
 
 /// Returns the minimum of sign · value over `count` ≥ 1 values.
 template <int sign, class Energy>
-[[gnu::always_inline]] inline Energy leastOf(const Energy* values, std::size_t count) {
-  Energy least = std::numeric_limits<Energy>::max();
-  for (std::size_t i = 0; i < count; ++i) least = std::min<Energy>(least, sign * values[i]);
-  return least;
+[[gnu::always_inline]] inline Energy minimumOf(const Energy* values, std::size_t count) {
+  Energy minimum = std::numeric_limits<Energy>::max();
+  for (std::size_t i = 0; i < count; ++i) minimum = std::min<Energy>(minimum, sign * values[i]);
+  return minimum;
 }
 
 /// Lowers the bounds to the energies in the first bricks of the kernel around `centre`.
@@ -254,11 +254,11 @@ template <int sign, std::size_t fixed, class Energy>
   for (std::size_t i = 0; i < brick_count; ++i) {
     const auto& brick = kernel.bricks[i];
     std::size_t at = x[brick.x] + y[brick.y] + z[brick.z];
-    const Energy least = leastOf<sign>(tile.energies().data() + at, volume);
+    const Energy minimum = minimumOf<sign>(tile.energies().data() + at, volume);
     for (std::vector<Energy>& level : bounds) {
       at /= group;
-      if (level[at] <= least) break;
-      level[at] = least;
+      if (level[at] <= minimum) break;
+      level[at] = minimum;
     }
   }
 }
@@ -267,7 +267,7 @@ template <int sign, std::size_t fixed, class Energy>
 template <int sign, class Energy>
 struct Loops {
   void (*deposit)(Tile<Energy>&, const IntegerKernel<Energy>&, const Coord&);
-  Energy (*least)(const Energy*, std::size_t);
+  Energy (*minimum)(const Energy*, std::size_t);
   void (*lower_bounds)(const Tile<Energy>&, const CentredKernel<Energy>&, std::size_t, const Coord&,
                        Bounds<Energy>&);
 };
@@ -277,8 +277,8 @@ void depositBaseline(Tile<Energy>& tile, const IntegerKernel<Energy>& kernel, co
   deposit<sign, fixed>(tile, kernel, centre);
 }
 template <int sign, class Energy>
-Energy leastBaseline(const Energy* values, std::size_t count) {
-  return leastOf<sign>(values, count);
+Energy minimumBaseline(const Energy* values, std::size_t count) {
+  return minimumOf<sign>(values, count);
 }
 template <int sign, std::size_t fixed, class Energy>
 void lowerBoundsBaseline(const Tile<Energy>& tile, const CentredKernel<Energy>& kernel,
@@ -298,8 +298,8 @@ VDBDITHER_AVX2 void depositAvx2(Tile<Energy>& tile, const IntegerKernel<Energy>&
   deposit<sign, fixed>(tile, kernel, centre);
 }
 template <int sign, class Energy>
-VDBDITHER_AVX2 Energy leastAvx2(const Energy* values, std::size_t count) {
-  return leastOf<sign>(values, count);
+VDBDITHER_AVX2 Energy minimumAvx2(const Energy* values, std::size_t count) {
+  return minimumOf<sign>(values, count);
 }
 template <int sign, std::size_t fixed, class Energy>
 VDBDITHER_AVX2 void lowerBoundsAvx2(const Tile<Energy>& tile, const CentredKernel<Energy>& kernel,
@@ -311,10 +311,10 @@ VDBDITHER_AVX2 void lowerBoundsAvx2(const Tile<Energy>& tile, const CentredKerne
 template <int sign, std::size_t fixed, class Energy>
 Loops<sign, Energy> loopsFor(InstructionSet instructions) {
   if (instructions == InstructionSet::avx2) {
-    return {depositAvx2<sign, fixed, Energy>, leastAvx2<sign, Energy>,
+    return {depositAvx2<sign, fixed, Energy>, minimumAvx2<sign, Energy>,
             lowerBoundsAvx2<sign, fixed, Energy>};
   }
-  return {depositBaseline<sign, fixed, Energy>, leastBaseline<sign, Energy>,
+  return {depositBaseline<sign, fixed, Energy>, minimumBaseline<sign, Energy>,
           lowerBoundsBaseline<sign, fixed, Energy>};
 }
 
@@ -332,7 +332,7 @@ class Extremum {
   Extremum(const Tile<Energy>& tile, InstructionSet instructions)
       : tile_(tile),
         loops_(loopsFor<sign, Energy>(instructions, tile.bricks())),
-        least_bound_(loopsFor<1, Energy>(instructions, tile.bricks()).least) {
+        minimum_bound_(loopsFor<1, Energy>(instructions, tile.bricks()).minimum) {
     std::size_t count = tile.energies().size();
     do {
       count = (count + group - 1) / group;
@@ -355,17 +355,17 @@ class Extremum {
     while (true) {
       std::size_t at = 0;
       for (auto level = bounds_.rbegin(); level != bounds_.rend(); ++level)
-        at = whereLeast(*level, at);
+        at = whereMinimum(*level, at);
       if (at == exact) {
         std::size_t found = at * group;
         while (sign * energies[found] != bounds_[0][at]) ++found;
         return tile_.bricks().voxel(found);
       }
       exact = at;
-      bounds_[0][at] = loops_.least(energies.data() + at * group, groupSize(energies, at));
+      bounds_[0][at] = loops_.minimum(energies.data() + at * group, groupSize(energies, at));
       for (std::size_t level = 1; level < bounds_.size(); ++level) {
         at /= group;
-        bounds_[level][at] = leastBound(bounds_[level - 1], at);
+        bounds_[level][at] = minimumBound(bounds_[level - 1], at);
       }
     }
   }
@@ -374,19 +374,19 @@ class Extremum {
   static std::size_t groupSize(const std::vector<Energy>& values, std::size_t at) {
     return std::min(group, values.size() - at * group);
   }
-  Energy leastBound(const std::vector<Energy>& bounds, std::size_t at) const {
-    return least_bound_(bounds.data() + at * group, groupSize(bounds, at));
+  Energy minimumBound(const std::vector<Energy>& bounds, std::size_t at) const {
+    return minimum_bound_(bounds.data() + at * group, groupSize(bounds, at));
   }
-  std::size_t whereLeast(const std::vector<Energy>& bounds, std::size_t at) const {
-    const Energy least = leastBound(bounds, at);
+  std::size_t whereMinimum(const std::vector<Energy>& bounds, std::size_t at) const {
+    const Energy minimum = minimumBound(bounds, at);
     std::size_t where = at * group;
-    while (bounds[where] != least) ++where;
+    while (bounds[where] != minimum) ++where;
     return where;
   }
 
   const Tile<Energy>& tile_;
   Loops<sign, Energy> loops_;
-  Energy (*least_bound_)(const Energy*, std::size_t);
+  Energy (*minimum_bound_)(const Energy*, std::size_t);
   Bounds<Energy> bounds_;
 };
 

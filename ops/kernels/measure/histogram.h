@@ -11,7 +11,7 @@ namespace vdbdither {
 class Histogram {
  public:
   /// A histogram of at most `bins` bins, none of which is narrower than 2^`minimum_exponent`.
-  Histogram(int bins, int least_exponent);
+  Histogram(int bins, int minimum_exponent);
 
   /// Adds values; those that are not finite are counted separately.
   void add(double value, std::uint64_t count);
@@ -28,7 +28,7 @@ class Histogram {
  private:
   void widen();
 
-  int most_;
+  int maximum_;
   int exponent_;
   std::int64_t first_ = 0;  ///< the multiple at which the first bin begins
   std::vector<std::uint64_t> counts_;

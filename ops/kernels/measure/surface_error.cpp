@@ -40,7 +40,7 @@ ErrorStatistics statistics(std::vector<std::pair<double, double>> sizes_and_weig
     result.weight += weight;
     sum += weight * size;
     squares += weight * size * size;
-    result.most_mm = std::max(result.most_mm, size);
+    result.maximum_mm = std::max(result.maximum_mm, size);
   }
   result.quantiles_mm.assign(steps + 1, 0);
   if (!(result.weight > 0)) return result;
@@ -55,7 +55,7 @@ ErrorStatistics statistics(std::vector<std::pair<double, double>> sizes_and_weig
     for (; next <= steps && static_cast<double>(next) / steps * result.weight <= below; ++next)
       result.quantiles_mm[next] = size;
   }
-  for (; next <= steps; ++next) result.quantiles_mm[next] = result.most_mm;
+  for (; next <= steps; ++next) result.quantiles_mm[next] = result.maximum_mm;
   return result;
 }
 

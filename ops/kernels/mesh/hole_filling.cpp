@@ -34,8 +34,8 @@ using Triangle = Mesh::Triangle;
 /// As a share of the solid's volume: the maximum sum over holes that keep their fan unexamined,
 /// each counted as a half ball; and the maximum that the other fillings may miss.
 constexpr double volume_tolerance = 4e-4;
-constexpr int most_rounds = 10;
-constexpr std::size_t most_triangles = 50'000;
+constexpr int maximum_rounds = 10;
+constexpr std::size_t maximum_triangles = 50'000;
 
 double lengthOf(const Mesh& mesh, const HoleLoop& loop) {
   double length = 0;
@@ -70,10 +70,10 @@ Vec3d areaOf(const Mesh& mesh, const Triangle& t) {
 
 /// Fills a loop with the triangles between its corners that have the minimum area (Barequet, Sharir
 /// 1995), or with a fan if there are too many corners.
-void fillWithLeastArea(Mesh& mesh, const HoleLoop& loop) {
+void fillWithMinimumArea(Mesh& mesh, const HoleLoop& loop) {
   const std::size_t count = loop.size();
-  constexpr std::size_t most_corners = 500;
-  if (count > most_corners) return fillWithFan(mesh, loop);
+  constexpr std::size_t maximum_corners = 500;
+  if (count > maximum_corners) return fillWithFan(mesh, loop);
   struct Best {
     double area = 0;
     std::uint32_t corner = 0;
@@ -82,13 +82,13 @@ void fillWithLeastArea(Mesh& mesh, const HoleLoop& loop) {
   for (std::size_t span = 2; span < count; ++span)
     for (std::size_t from = 0; from + span < count; ++from) {
       const std::size_t to = from + span;
-      Best least{std::numeric_limits<double>::infinity()};
+      Best minimum{std::numeric_limits<double>::infinity()};
       for (std::size_t corner = from + 1; corner < to; ++corner) {
         const double area = best[from * count + corner].area + best[corner * count + to].area +
                             areaOf(mesh, {loop[from], loop[corner], loop[to]}).length();
-        if (area < least.area) least = {area, static_cast<std::uint32_t>(corner)};
+        if (area < minimum.area) minimum = {area, static_cast<std::uint32_t>(corner)};
       }
-      best[from * count + to] = least;
+      best[from * count + to] = minimum;
     }
   std::vector<std::pair<std::size_t, std::size_t>> sides{{0, count - 1}};
   while (!sides.empty()) {
@@ -139,12 +139,12 @@ class Membranes {
   std::vector<bool> is_new_;         ///< by vertex: its sides were not yet examined
   std::size_t holes_;
   double miss_mm_;                   ///< the maximum distance of a side's middle from the surface
-  double least_mm3_;                 ///< the minimum volume that is worth a cut
+  double minimum_mm3_;               ///< the minimum volume that is worth a cut
   std::vector<double> of_fans_mm3_;  ///< by hole, the volume between the fan and the surface
 };
 
 Membranes::Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops, double miss_mm3)
-    : number_(open), holes_(loops.size()), least_mm3_(miss_mm3 / 1000) {
+    : number_(open), holes_(loops.size()), minimum_mm3_(miss_mm3 / 1000) {
   std::vector<HoleLoop> own;
   for (const HoleLoop* loop : loops) {
     HoleLoop& corners = own.emplace_back();
@@ -162,7 +162,7 @@ Membranes::Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops
       hole_.resize(mesh_.triangles.size(), hole);
     }
   };
-  fill(fillWithLeastArea);
+  fill(fillWithMinimumArea);
   first_ = mesh_;
   std::vector<std::uint32_t> first_hole = hole_;
   first_number_.emplace(first_);
@@ -254,7 +254,7 @@ bool Membranes::cut() {
     for (const std::uint32_t half : edges.halves(looked_at[i]))
       area_mm2 += areaOf(mesh_, mesh_.triangles[half / 3]).length();
     const double miss_mm = made[i].by.length();
-    if (!made[i].leads_there || miss_mm <= miss_mm_ || miss_mm * area_mm2 < 3 * least_mm3_)
+    if (!made[i].leads_there || miss_mm <= miss_mm_ || miss_mm * area_mm2 < 3 * minimum_mm3_)
       continue;
     is_cut = true;
     for (const std::uint32_t half : edges.halves(looked_at[i]))
@@ -313,7 +313,8 @@ std::vector<double> Membranes::misses() const {
 }
 
 std::vector<bool> Membranes::bend() {
-  for (int round = 0; round < most_rounds && mesh_.triangles.size() < most_triangles; ++round) {
+  for (int round = 0; round < maximum_rounds && mesh_.triangles.size() < maximum_triangles;
+       ++round) {
     if (!cut()) break;
   }
   const std::vector<double> after = misses();

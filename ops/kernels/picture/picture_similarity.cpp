@@ -90,9 +90,9 @@ Plane combined(const Plane& a, const Plane& b, const Function& function) {
 
 using Complex = std::complex<double>;
 
-std::size_t powerOfTwoFrom(int least) {
+std::size_t powerOfTwoFrom(int minimum) {
   std::size_t size = 1;
-  while (size < static_cast<std::size_t>(least)) size *= 2;
+  while (size < static_cast<std::size_t>(minimum)) size *= 2;
   return size;
 }
 
@@ -400,16 +400,17 @@ Plane flipDifference(const ColourPlanes& reference, const ColourPlanes& test,
   constexpr double bend_to = 0.95;
   const FlipView a = flipView(reference, pixels_per_degree);
   const FlipView b = flipView(test, pixels_per_degree);
-  const double most = std::pow(hyab(huntLab({0, 1, 0}), huntLab({0, 0, 1})), colour_exponent);
+  const double maximum = std::pow(hyab(huntLab({0, 1, 0}), huntLab({0, 0, 1})), colour_exponent);
   Plane map(reference[0].width, reference[0].height);
   for (std::size_t i = 0; i < map.values.size(); ++i) {
     const auto colourOf = [i](const FlipView& view) {
       return Colour{view.colour[0].values[i], view.colour[1].values[i], view.colour[2].values[i]};
     };
     const double raised = std::pow(hyab(colourOf(a), colourOf(b)), colour_exponent);
-    const double bend = bend_from * most;
-    const double colour = raised < bend ? bend_to / bend * raised
-                                        : bend_to + (raised - bend) / (most - bend) * (1 - bend_to);
+    const double bend = bend_from * maximum;
+    const double colour = raised < bend
+                              ? bend_to / bend * raised
+                              : bend_to + (raised - bend) / (maximum - bend) * (1 - bend_to);
     const double features = std::max(std::abs(a.edges.values[i] - b.edges.values[i]),
                                      std::abs(a.points.values[i] - b.points.values[i]));
     const double sharp =

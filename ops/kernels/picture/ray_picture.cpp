@@ -207,10 +207,10 @@ void frame(Camera& camera, const Mesh& mesh, int margin) {
     low_y = std::min(low_y, y);
     high_y = std::max(high_y, y);
   }
-  constexpr double most = 16384;
+  constexpr double maximum = 16384;
   const double columns = std::ceil(high_x) - std::floor(low_x) + 2.0 * margin;
   const double rows = std::ceil(high_y) - std::floor(low_y) + 2.0 * margin;
-  if (!(columns <= most && rows <= most))
+  if (!(columns <= maximum && rows <= maximum))
     throw DataError("the picture would have more than 16384 pixels on a side; take larger ones");
   camera.left = static_cast<int>(std::floor(low_x)) - margin;
   camera.top = static_cast<int>(std::ceil(high_y)) + margin;

@@ -63,13 +63,13 @@ void lower(Plane& to, float added) {
   for (float& square : to) square = std::min(square, added);
 }
 
-float greatest(const Plane& squares) {
-  Plane most = squares;
+float maximumOf(const Plane& squares) {
+  Plane maximum = squares;
   // Compares halves, so that lanes do not depend on each other.
-  for (std::size_t half = most.size() / 2; half >= 4; half /= 2) {
-    for (std::size_t i = 0; i < half; ++i) most[i] = std::max(most[i], most[i + half]);
+  for (std::size_t half = maximum.size() / 2; half >= 4; half /= 2) {
+    for (std::size_t i = 0; i < half; ++i) maximum[i] = std::max(maximum[i], maximum[i + half]);
   }
-  return std::max(std::max(most[0], most[1]), std::max(most[2], most[3]));
+  return std::max(std::max(maximum[0], maximum[1]), std::max(maximum[2], maximum[3]));
 }
 
 int leafOrigin(int index) { return index & ~(edge - 1); }
@@ -244,27 +244,27 @@ class StripTransform {
   /// Returns the minimum over the planes of a row of blocks around plane `at`, up to the reach, or
   /// until no value above `enough` can be reduced.
   template <typename BlockAt>
-  Plane leastAround(int at, int axis, float enough, const BlockAt& block_at) const {
-    Plane least;
-    least.fill(infinite);
+  Plane minimumAround(int at, int axis, float enough, const BlockAt& block_at) const {
+    Plane minimum;
+    minimum.fill(infinite);
     const std::vector<float>& added = squares_[axis];
     const auto take = [&](int from, float square) {
       const Block& source = block_at(from / edge);
-      if (source.state == Block::State::zero) lower(least, square);
+      if (source.state == Block::State::zero) lower(minimum, square);
       if (source.state == Block::State::mixed)
-        lower(least, source.squares.data() + from % edge * plane, square);
+        lower(minimum, source.squares.data() + from % edge * plane, square);
     };
     take(at, added[0]);
     for (int step = 1; step <= reach(axis); ++step) {
       // Tested at every step at first, at every eighth later.
       if (step <= 4 || step % edge == 0) {
-        const float most = greatest(least);
-        if (most <= std::max(enough, added[step])) break;
+        const float maximum = maximumOf(minimum);
+        if (maximum <= std::max(enough, added[step])) break;
       }
       take(at - step, added[step]);
       take(at + step, added[step]);
     }
-    return least;
+    return minimum;
   }
 
   /// The pass along y, from the columns in front and behind. Made once per block.
@@ -283,11 +283,11 @@ class StripTransform {
     }
     block.state = Block::State::beyond_reach;
     for (int y = 0; y < edge && !all_beyond; ++y) {
-      const Plane least =
-          leastAround(y + margin * edge, 1, 0, [&](int i) -> const Block& { return *along_y_[i]; });
+      const Plane minimum = minimumAround(y + margin * edge, 1, 0,
+                                          [&](int i) -> const Block& { return *along_y_[i]; });
       for (int x = 0; x < edge; ++x) {
         for (int z = 0; z < edge; ++z) {
-          const float square = least[x * edge + z];
+          const float square = minimum[x * edge + z];
           if (square <= limits_.back()) block.state = Block::State::mixed;
           block.squares[(x * edge + y) * edge + z] = square;
         }
@@ -308,9 +308,10 @@ class StripTransform {
     std::array<float, volume> squares;
     squares.fill(infinite);
     for (int x = 0; x < edge && !all_beyond; ++x) {
-      const Plane least = leastAround(x + margin * edge, 0, limits_.front(),
-                                      [&](int i) -> const Block& { return blocks_[index + i]; });
-      std::copy(least.begin(), least.end(), squares.begin() + x * plane);
+      const Plane minimum =
+          minimumAround(x + margin * edge, 0, limits_.front(),
+                        [&](int i) -> const Block& { return blocks_[index + i]; });
+      std::copy(minimum.begin(), minimum.end(), squares.begin() + x * plane);
     }
     std::array<std::int32_t, volume> values{};
     for (int i = 0; i < volume; ++i) {
