@@ -63,8 +63,8 @@ struct LeafEdge {
 /// Finds the first crossing of an edge. Two crossings closer than the thinnest wall cancel.
 EdgeCrossing crossingOf(const WindingSolid& solid, const LeafEdge& edge);
 
-/// The point of the cube with the least squared distance to the tangent planes at the crossings;
-/// along directions that these leave open, the mean of the crossings.
+/// Returns the point of the cube with the minimum sum of squared distances to the tangent planes at
+/// the crossings; along directions that these do not determine, the mean of the crossings.
 openvdb::Vec3d meetingPoint(const LeafCube& cube, std::span<const EdgeCrossing> crossings);
 
 }  // namespace vdbdither

@@ -36,8 +36,8 @@ struct Touch {
   }
 };
 
-/// Finds the cells that a triangle meets: of the columns along the axis that it faces most those
-/// that its bounding box meets, and in each the cells that its plane passes.
+/// Finds the cells that a triangle meets: in each column along the main axis of its normal that its
+/// bounding box meets, the cells that its plane passes.
 void addTouches(const WindingCells& cells, std::uint32_t triangle, std::vector<Touch>& touches) {
   const double cell_mm = WindingOctree::root_units * cells.unitMm();
   const Vec3d origin_mm = cells.position(Coord(0));
