@@ -45,20 +45,22 @@ Mesh joined(std::vector<Mesh> meshes) {
   return all;
 }
 
-void place(Mesh& mesh, const MeshPlacement& placement) {
+void place(std::span<Mesh> meshes, const MeshPlacement& placement) {
   double factor = placement.factor;
-  rotate(mesh, placement.rotate_degrees);
+  for (Mesh& mesh : meshes) rotate(mesh, placement.rotate_degrees);
   if (placement.fit_mm > 0) {
-    const MeshBounds bounds = boundsOf(mesh);
+    const MeshBounds bounds = boundsOf(meshes);
     const Vec3d extent = bounds.max - bounds.min;
     const double longest = std::max({extent.x(), extent.y(), extent.z()});
     if (!(longest > 0)) throw DataError("--fit: the mesh has no extent");
     factor = placement.fit_mm / longest;
   }
-  for (Vec3d& vertex : mesh.vertices) vertex *= factor;
+  for (Mesh& mesh : meshes)
+    for (Vec3d& vertex : mesh.vertices) vertex *= factor;
   if (!placement.on_bed) return;
-  const Vec3d corner = boundsOf(mesh).min;
-  for (Vec3d& vertex : mesh.vertices) vertex -= corner;
+  const Vec3d corner = boundsOf(meshes).min;
+  for (Mesh& mesh : meshes)
+    for (Vec3d& vertex : mesh.vertices) vertex -= corner;
 }
 
 }  // namespace vdbdither
