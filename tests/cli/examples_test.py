@@ -48,8 +48,9 @@ class Documents(ProgramTest):
                     self.doCleanups()
                     super().setUp()
                     meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
+                    meshes.write_stl(self.folder / "lid.stl", meshes.box((0.6, 0.6, 0.4), (-0.3, -0.3, 0.9)))
                     for line in lines:
-                        # Ways to the same end are shown one below the other.
+                        # Several lines of a block can write the same stack.
                         if "slice-export out" in line:
                             shutil.rmtree(self.folder / "out", ignore_errors=True)
                         self.shell(line)
