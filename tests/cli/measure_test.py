@@ -1,4 +1,4 @@
-"""measure and mesh-export from outside: alone, at the end of a chain, of a pipe."""
+"""measure and mesh-export: alone, at the end of a chain, and at the end of a pipe."""
 
 import json
 import unittest
@@ -20,7 +20,7 @@ class MeasureTest(ProgramTest):
         words = self.succeed("measure", "result.stl", "--reference", "part.stl").decode()
         self.assertIn("by area", words)
 
-    def test_what_stands_alone_is_no_part_of_a_chain(self):
+    def test_measuring_files_is_refused_in_a_chain(self):
         message = "measure: works on the files it names and is no part of a chain then"
         alone = ("measure", "part.stl", "--reference", "part.stl")
         self.refuse(2, message, "mesh2sdf", "part.stl", *MIMAKI, "!", *alone)
@@ -38,7 +38,7 @@ class MeasureTest(ProgramTest):
             self.assertEqual((self.folder / f"fused.{kind}").read_bytes(), (self.folder / f"piped.{kind}").read_bytes())
 
     def test_dithering_leaves_less_of_the_steps_than_plain_voxels_after_the_print(self):
-        # Large enough that its edges, which the print rounds, count for little.
+        # The part is large; its edges, which the print rounds, hardly count.
         meshes.write_stl(self.folder / "large.stl", meshes.turned(meshes.box((5, 5, 5)), 2, 3))
         staircase = {}
         for mask in ("none", "white"):
