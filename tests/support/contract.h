@@ -6,10 +6,10 @@
 
 namespace vdbdither::test {
 
-/// Holds a planned filter against what every filter promises (docs/writing-an-operator.md): the
-/// same voxels for slabs of `height` layers as for the whole, whatever lies outside its declared
-/// reach; voxels only within the core; inputs left as they were; empty slabs accepted. Returns the
-/// first breach in words, or nothing.
+/// Checks the contract of filters (docs/writing-an-operator.md) for a planned filter: slabs of
+/// `height` layers give the same voxels as the whole, for any values outside the declared reach;
+/// voxels lie only within the core; inputs stay unchanged; empty slabs are accepted. Returns a
+/// description of the first breach, or an empty text.
 std::string firstBreach(const Filter& filter, const Schema& in, const Grids& whole, int height);
 
 }  // namespace vdbdither::test

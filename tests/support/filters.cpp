@@ -44,7 +44,7 @@ Grids runWhole(Filter& filter, const Schema& schema) {
 
 namespace {
 
-/// A copy of `grid` in which every voxel of every leaf outside `valid` is active and holds rubbish.
+/// Returns a copy of `grid` in which every voxel outside `valid` is active and has a wrong value.
 template <typename GridType>
 GridConstPtr spoiled(const GridType& grid, ZRange valid,
                      const typename GridType::ValueType& rubbish) {
