@@ -1,0 +1,69 @@
+#pragma once
+
+#include <memory>
+
+#include <openvdb/Types.h>
+#include <openvdb/math/Coord.h>
+
+#include "vdbdither/model/lattice.h"
+
+namespace vdbdither {
+
+/// An inactive leaf whose voxels hold `value`, with its buffer allocated.
+template <class Tree>
+typename Tree::LeafNodeType* newLeaf(const openvdb::Coord& origin,
+                                     const typename Tree::ValueType& value) {
+  auto* leaf = new typename Tree::LeafNodeType(openvdb::PartialCreate(), origin, value, false);
+  leaf->allocate();
+  return leaf;
+}
+
+/// Leaves beside each other along x, from the one at `origin` on.
+struct LeafRun {
+  openvdb::Coord origin;
+  int leaves;
+};
+
+/// Hangs leaves and tiles into the nodes above leaves, which must be there. Several threads may do
+/// so at once in different nodes.
+template <class Tree>
+class NodeWriter {
+ public:
+  using Parent = typename Tree::RootNodeType::ChildNodeType::ChildNodeType;
+
+  static openvdb::Coord parentOf(const openvdb::Coord& xyz) {
+    return xyz & ~(static_cast<int>(Parent::DIM) - 1);
+  }
+
+  /// Makes the node above the leaf at `origin`.
+  static void makeParent(Tree& tree, const openvdb::Coord& origin) {
+    if (!tree.template probeConstNode<Parent>(origin))
+      tree.addTile(1, origin, tree.background(), false);
+  }
+
+  explicit NodeWriter(Tree& tree) : tree_(tree) {}
+
+  void set(std::unique_ptr<typename Tree::LeafNodeType> leaf) {
+    Parent& parent = parentAt(leaf->origin());
+    parent.addLeaf(leaf.release());
+  }
+
+  void set(const LeafRun& run, const typename Tree::ValueType& value) {
+    for (int leaf = 0; leaf < run.leaves; ++leaf) {
+      const openvdb::Coord origin = run.origin.offsetBy(leaf * leaf_layers, 0, 0);
+      parentAt(origin).addTile(Parent::coordToOffset(origin), value, false);
+    }
+  }
+
+ private:
+  Parent& parentAt(const openvdb::Coord& xyz) {
+    if (!parent_ || parent_->origin() != parentOf(xyz))
+      parent_ = tree_.template probeNode<Parent>(xyz);
+    return *parent_;
+  }
+
+  Tree& tree_;
+  Parent* parent_ = nullptr;
+};
+
+}  // namespace vdbdither
