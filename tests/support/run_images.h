@@ -7,11 +7,11 @@
 
 namespace vdbdither::test {
 
-/// The image whose pixel in column x of row y is `pixel(x, y)`.
+/// Returns the image whose pixel in column x of row y is `pixel(x, y)`.
 RunImage runImage(int width, int height, const std::function<std::uint32_t(int x, int y)>& pixel);
 
-/// A disc of value 1 on 0 that fills the image; over `rim` pixels inwards from its edge its pixels
-/// grow from rare to certain, as in a slice through a dithered slope.
+/// Returns a disc of value 1 on 0 that fills the image. Within `rim` pixels of its edge the
+/// probability of 1 rises inwards from 0 to 1, as in a slice through a dithered slope.
 RunImage ditheredDisc(int width, int height, double rim, std::uint32_t seed);
 
 }  // namespace vdbdither::test
