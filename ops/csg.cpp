@@ -1,5 +1,6 @@
 #include "ops/kernels/distance/csg.h"
 
+#include <array>
 #include <memory>
 #include <string>
 
@@ -17,6 +18,11 @@ namespace {
 using openvdb::FloatGrid;
 using openvdb::Int32Grid;
 
+enum class Priority { first, second };
+constexpr std::array<Choice<Priority>, 2> priorities{
+    {{Priority::first, "first", "That of the volume that reaches this step"},
+     {Priority::second, "second", "That of the file"}}};
+
 std::string latticeText(const Lattice& lattice) {
   std::string text;
   for (int axis = 0; axis < 3; ++axis)
@@ -28,11 +34,11 @@ std::string latticeText(const Lattice& lattice) {
 class CsgOperator : public Filter {
  public:
   void declare(Options& options) override {
-    options.text("union", unite_, "FILE.vdb", "Adds the surface of this file or named pipe");
-    options.text("intersection", intersect_, "FILE.vdb", "Keeps what lies in this one, too");
-    options.text("difference", subtract_, "FILE.vdb", "Takes this one away");
-    options.choice("priority", priority_, {"first", "second"},
-                   "Whose part, and so whose material, is it where both are: of a union");
+    options.file("union", unite_, "FILE.vdb", "Adds the surface of this file or named pipe");
+    options.file("intersection", intersect_, "FILE.vdb", "Keeps what also lies in this one");
+    options.file("difference", subtract_, "FILE.vdb", "Removes this one");
+    options.choice("priority", priority_, priorities,
+                   "Whose part, and so whose material, a union has where both are");
   }
 
   Schema plan(const Schema& in) override {
@@ -54,13 +60,7 @@ class CsgOperator : public Filter {
 
     Schema out = withoutSurfaceExtras(in);
     out.grids[surface_grid] = emptyCombined(*surface, *empty_);
-    out.leaves_per_row += second.leaves_per_row;
-    if (in.leaves == 0 || second.leaves == 0) {
-      out.leaves = out.surface_leaves = 0;
-    } else {
-      out.leaves += second.leaves;
-      out.surface_leaves += second.surface_leaves;
-    }
+    out.footprint = in.footprint + second.footprint;
     if (operation_ == Csg::unite) {
       out.lattice.box.expand(second.lattice.box);
       planParts(in, second, path);
@@ -75,16 +75,15 @@ class CsgOperator : public Filter {
     return reads;
   }
 
-  [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
+  [[nodiscard]] std::vector<Input*> inputs() override { return {other_.get()}; }
 
-  void drain() override { other_->drain(); }
-
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 14}; }
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_held_leaf = cost::csg_us};
+  }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
-    const ZRange there = intersection(in.core, other_->schema().lattice.layers());
-    const Grids second = there.empty() ? Grids{} : other_->run(there);
+    const Grids& second = in.inputs.at(0);
     const auto others =
         second.contains(surface_grid) ? findGrid<FloatGrid>(second, surface_grid) : empty_;
     Grids out{{surface_grid, combined(*surface, *others, operation_, in.core)}};
@@ -94,7 +93,7 @@ class CsgOperator : public Filter {
                                   ? findGrid<Int32Grid>(second, part_grid)
                                   : nullptr;
     const auto united = unitedParts(*surface, *others, parts.get(), others_parts.get(),
-                                    first_parts_, priority_ == "second", in.core);
+                                    first_parts_, priority_ == Priority::second, in.core);
     united->insertMeta(*emptyParts(*surface));
     out[part_grid] = united;
     return out;
@@ -137,7 +136,7 @@ class CsgOperator : public Filter {
   std::string unite_;
   std::string intersect_;
   std::string subtract_;
-  std::string priority_ = "first";
+  Priority priority_ = Priority::first;
 
   Csg operation_ = Csg::unite;
   std::unique_ptr<SlabReader> other_;

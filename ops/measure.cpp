@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file/staged_output.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/mesh/mesh_writer.h"
 #include "ops/kernels/contour/grid_surface.h"
@@ -22,6 +23,7 @@
 #include "ops/kernels/mesh/taubin.h"
 #include "ops/kernels/picture/diverging_colours.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
 
@@ -30,6 +32,11 @@ namespace vdbdither {
 namespace {
 
 using nlohmann::ordered_json;
+
+/// The endings of the mesh files that hold the error of each vertex.
+std::string colouredEndings() {
+  return meshEndings([](const MeshFormat& format) { return format.holds_extras; });
+}
 
 ordered_json json(const ErrorStatistics& statistics) {
   ordered_json result{{"weight", statistics.weight},         {"bias_mm", statistics.bias_mm},
@@ -126,83 +133,193 @@ std::string plainText(const ordered_json& all) {
   return text;
 }
 
-/// How far a surface lies from the one it should be.
-class Measure : public Sink {
+/// Measures how far a surface, wherever it comes from, lies from the one it should be.
+class SurfaceMeasurement {
  public:
-  void declare(Options& options) override {
-    options.positional("mesh", file_,
-                       "A mesh to measure in place of what comes down a chain: STL, OBJ or PLY",
-                       false);
-    options.text("reference", reference_file_, "FILE", "The mesh that it should be");
-    options.choice("unit", unit_, {"mm", "cm", "m", "in", "um"},
-                   "What the reference's numbers mean");
-    options.number("scale", scale_, 1e-6, 1e6, "Scales the reference about the origin");
-    options.length("fit", placement_.fit_mm,
-                   "Scales the reference until its longest axis has this length");
-    options.triple("rotate", placement_.rotate_degrees, "X,Y,Z",
-                   "Turns the reference about x, then y, then z, in degrees");
-    options.flag("place", placement_.on_bed,
-                 "Puts the reference on the bed: its bounding box begins at the origin");
-    options.text("grid", grid_, "NAME",
-                 "Whose surface comes down the chain: of solid its voxels, of printed, displaced "
-                 "and surface a level; auto takes the furthest down the chain");
-    options.choice("smooth", smooth_, {"none", "taubin"},
-                   "taubin: Taubin's smoothing before, lambda 0.5 and mu -0.53");
-    options.integer("iterations", taubin_.iterations, 1, 100000, "How often it smooths");
-    options.length("spacing", spacing_mm_,
-                   "Triangles with longer sides are measured at points in between too");
-    options.length("cutoff", rules_.cutoff_mm,
-                   "The shortest wavelength that counts for the band-limited roughness");
-    options.length("margin", rules_.margin_mm,
-                   "Roughness leaves out what is nearer than this to an edge of a facet");
-    options.text("report", report_file_, "FILE.json", "Writes all figures to a file");
-    options.text("map", map_file_, "FILE.ply", "Writes the mesh, coloured by its error");
-    options.length("map-range", map_range_mm_,
-                   "The error of the map's last colours; 0 takes the 99th percentile");
-    options.flag("json", json_, "Prints all figures, as JSON");
-    options.flag("overwrite", overwrite_, "Replace files that are there");
+  void declare(Options& options) {
+    options.file("reference", reference_file_, "FILE", "Mesh that the surface should be");
+    options.required();
+    placement_.declare(options, "the reference");
+    surface_grid_.declare(options);
+    smoothing_.declare(options);
+    options.length("spacing", spacing_mm_, {1e-3, 1000},
+                   "Maximum distance between the points at which a triangle is measured");
+    options.length("cutoff", rules_.cutoff_mm, {1e-3, 1e4},
+                   "Minimum wavelength that counts for the band-limited roughness");
+    options.length("margin", rules_.margin_mm, {0, 1000},
+                   "Distance from the edges of a facet within which its roughness is not measured");
+    options.file("report", report_file_, "FILE.json", "Writes all figures to a file");
+    options.file("map", map_file_, "FILE",
+                 "Writes the mesh, coloured by its error, into a " + colouredEndings() + " file");
+    options.length("map-range", map_range_mm_, Range::above(0, 1000),
+                   "Error that the last colours of the map stand for",
+                   {"auto", "The 99th percentile of the error"});
+    json_.declare(options);
+    overwrite_.declare(options, "each file");
   }
 
-  [[nodiscard]] bool standsAlone() const override { return !file_.empty(); }
-
-  void plan(const Schema& in) override {
-    if (reference_file_.empty())
-      throw UsageError("--reference is missing: name the mesh that the surface should be");
-    for (const auto& [name, value] :
-         {std::pair("--spacing", spacing_mm_), std::pair("--cutoff", rules_.cutoff_mm)}) {
-      if (!(value > 0)) throw UsageError(std::string(name) + ": 0 mm is no length to look at");
-    }
+  /// Makes every check that does not need the surface, and reads the reference.
+  void begin(Reporter& reporter) {
     if (!report_file_.empty())
-      StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_);
+      StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_.overwrite);
     if (!map_file_.empty()) {
-      if (!map_file_.ends_with(".ply"))
-        throw UsageError("--map: '" + map_file_ + "' is no .ply, which alone holds colours");
-      MeshWriter::check(map_file_, overwrite_);
+      const MeshFormat* format = meshFormatNamedBy(map_file_);
+      if (format == nullptr || !format->holds_extras)
+        throw UsageError("--map: '" + map_file_ + "' cannot hold colours; name a " +
+                         colouredEndings() + " file");
+      MeshWriter::check(map_file_, overwrite_.overwrite);
     }
-    if (!standsAlone()) {
-      std::vector<std::string> there;
-      for (const auto& [name, grid] : in.grids) there.push_back(name);
-      name_ = chosenSurfaceGrid(there, grid_);
-      lattice_ = in.lattice;
-      surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
-      components_.emplace(surface_->frame());
-    }
-    readReference();
+    readReference(reporter);
   }
 
-  [[nodiscard]] bool isBarrier() const override { return true; }
+  [[nodiscard]] const std::optional<std::string>& grid() const { return surface_grid_.grid; }
+  [[nodiscard]] bool smooths() const { return smoothing_.smoothing != Smoothing::none; }
 
-  [[nodiscard]] std::optional<Work> work() const override {
+  [[nodiscard]] Work work(const Lattice& lattice) const {
     // Triangles at the surface are about as long as the diagonal of a voxel's largest face.
-    const openvdb::Vec3d& pitch = lattice_.pitch_mm;
+    const openvdb::Vec3d& pitch = lattice.pitch_mm;
     const double side_mm =
         std::sqrt(pitch.lengthSqr() - std::pow(std::min({pitch.x(), pitch.y(), pitch.z()}), 2));
     const double cuts = side_mm > spacing_mm_ ? std::ceil(side_mm / spacing_mm_) : 0;
     const double points = 1 + 2 * cuts * cuts;  // for a vertex
-    const double smoothing = smooth_ == "none" ? 0 : taubin_.usPerVertex();
-    return Work{.us_per_leaf = GridSurface::vertices_per_leaf * (0.3 + 1.3 * points + smoothing),
-                .seconds = 2e-6 * static_cast<double>(reference_->mesh().triangles.size())};
+    const double smoothing = smooths() ? cost::smoothingUs(smoothing_.iterations) : 0;
+    const double vertex_us = cost::measure_us + cost::measure_us_per_point * points + smoothing;
+    const auto triangles = static_cast<double>(reference_->mesh().triangles.size());
+    return Work{.us_per_surface_leaf = GridSurface::vertices_per_leaf * vertex_us,
+                .seconds = 1e-6 * cost::measure_us_per_triangle * triangles};
   }
+
+  /// Measures `mesh` and gives the figures out.
+  ///
+  /// \param of          the name of the surface in the report
+  /// \param lattice     of the voxels that the surface was made from, or null
+  /// \param components  their components, or null
+  void finish(Mesh mesh, const std::string& of, const Lattice* lattice, VoxelComponents* components,
+              Reporter& reporter) const {
+    const auto progress = [&](double fraction) { reporter.progress(fraction); };
+    if (smooths()) smooth(mesh, taubin(), progress);
+    const SurfaceErrors errors = surfaceErrors(mesh, *reference_, spacing_mm_, progress);
+    const ordered_json all = figures(errors, mesh, of, lattice, components);
+    for (const char* name :
+         {"bias_mm", "mean_mm", "rms_mm", "p50_mm", "p90_mm", "p95_mm", "p99_mm", "max_mm"})
+      reporter.count(name, all["area"][name].get<double>());
+    // Both files appear, or none.
+    std::optional<StagedOutput> staged;
+    if (!report_file_.empty()) {
+      const std::string text = all.dump(1) + "\n";
+      staged.emplace(report_file_, StagedOutput::Kind::file);
+      writeFile(staged->path(), {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
+                report_file_);
+    }
+    if (!map_file_.empty()) writeMap(mesh, errors, all["map_range_mm"].get<double>());
+    if (staged) staged->commit();
+    if (json_.json) {
+      reporter.print(all.dump(1) + "\n");
+    } else if (report_file_.empty()) {
+      reporter.print(plainText(all));
+    }
+  }
+
+ private:
+  [[nodiscard]] Taubin taubin() const { return {.iterations = smoothing_.iterations}; }
+
+  void readReference(Reporter& reporter) {
+    Mesh mesh = readMesh(reference_file_, [&](const std::string& text) { reporter.warn(text); });
+    const MeshPlacementOptions& given = placement_;
+    place(mesh, {given.rotate_degrees, given.mmPerUnit(), given.fit_mm.value_or(0), given.on_bed});
+    // Errors are measured to the triangles given, so that nothing is guessed in their place.
+    SolidMesh solid = solidMesh(std::move(mesh), {.guess = false, .find_walls = false});
+    if (solid.mesh.triangles.empty())
+      throw DataError(
+          "--reference: the mesh has no surface: all its triangles are degenerate or "
+          "cancel");
+    for (const std::string& line : solid.report.repairs.lines())
+      reporter.warn("--reference: " + line);
+    reference_.emplace(std::move(solid.mesh));
+  }
+
+  [[nodiscard]] ordered_json figures(const SurfaceErrors& errors, const Mesh& mesh,
+                                     const std::string& of, const Lattice* lattice,
+                                     VoxelComponents* components) const {
+    ordered_json all;
+    all["surface"] = json(mesh);
+    all["surface"]["of"] = of;
+    all["surface"]["smoothing"] = smooths() ? smoothing_.iterations : 0;
+    all["reference"] = json(reference_->mesh());
+    all["reference"]["of"] = reference_file_;
+    const double volume = all["surface"]["volume_mm3"];
+    const double wanted = all["reference"]["volume_mm3"];
+    all["volume_error_mm3"] = volume - wanted;
+    all["volume_error_percent"] = wanted != 0 ? 100 * (volume - wanted) / wanted : 0;
+    const ErrorStatistics by_area = statisticsByArea(errors);
+    all["area"] = json(by_area);
+    all["vertices"] = json(statisticsByVertex(errors));
+    const auto axes = axisErrors(errors, *reference_, lattice);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      all["axes"][std::string(1, static_cast<char>('x' + axis))] = json(axes[axis]);
+    all["cutoff_mm"] = rules_.cutoff_mm;
+    all["margin_mm"] = rules_.margin_mm;
+    all["facets"] = ordered_json::array();
+    for (const FacetRoughness& facet : facetRoughness(errors, *reference_, rules_))
+      all["facets"].push_back(json(facet));
+    if (components) {
+      const VoxelComponents::Counts counts = components->finish();
+      all["components"] = json(counts.components);
+      all["cavities"] = json(counts.cavities);
+    }
+    all["map_range_mm"] = map_range_mm_.value_or(by_area.percentile(99));
+    return all;
+  }
+
+  void writeMap(const Mesh& mesh, const SurfaceErrors& errors, double range_mm) const {
+    VertexExtras extras{true, true,
+                        "quality is the error in mm; blue is -" + shortestText(range_mm) +
+                            ", grey 0, red " + shortestText(range_mm)};
+    MeshWriter writer(map_file_, extras);
+    std::vector<std::array<std::uint8_t, 3>> colours;
+    std::vector<float> qualities;
+    for (std::size_t vertex = 0; vertex < errors.vertices; ++vertex) {
+      const double error = errors.error_mm[vertex];
+      colours.push_back(divergingColour(range_mm > 0 ? error / range_mm : 0));
+      qualities.push_back(static_cast<float>(error));
+    }
+    writer.add(mesh.vertices, mesh.triangles, 0, colours, qualities);
+    writer.commit();
+  }
+
+  std::string reference_file_;
+  MeshPlacementOptions placement_;
+  SurfaceGridOption surface_grid_;
+  SmoothingOptions smoothing_;
+  double spacing_mm_ = 0.1;
+  RoughnessRules rules_;
+  std::string report_file_;
+  std::string map_file_;
+  std::optional<double> map_range_mm_;
+  JsonOption json_;
+  OverwriteOption overwrite_;
+
+  std::optional<ClosestPoints> reference_;
+};
+
+/// The surface of a grid.
+class Measure : public Sink {
+ public:
+  void declare(Options& options) override { measurement_.declare(options); }
+
+  void plan(const Schema& in) override {
+    std::vector<std::string> there;
+    for (const auto& [name, grid] : in.grids) there.push_back(name);
+    name_ = chosenSurfaceGrid(there, measurement_.grid());
+    lattice_ = in.lattice;
+    surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
+    components_.emplace(surface_->frame());
+    measurement_.begin(report());
+  }
+
+  [[nodiscard]] bool isBarrier() const override { return true; }
+
+  [[nodiscard]] std::optional<Work> work() const override { return measurement_.work(lattice_); }
 
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
     return std::vector<std::string>{name_};
@@ -215,143 +332,65 @@ class Measure : public Sink {
   }
 
   void finish() override {
-    const auto progress = [this](double fraction) { report().progress(fraction); };
-    const auto warn = [this](const std::string& text) { report().warn(text); };
-    if (standsAlone()) {
-      mesh_ = readMesh(file_, warn);
-      if (smooth_ != "none") checkClosed();
-    } else {
-      append(mesh_, surface_->finish());
-    }
+    append(mesh_, surface_->finish());
     if (mesh_.triangles.empty())
       throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
-    if (smooth_ != "none") smooth(mesh_, taubin_, progress);
-    const SurfaceErrors errors = surfaceErrors(mesh_, *reference_, spacing_mm_, progress);
-    const ordered_json all = figures(errors);
-    for (const char* name :
-         {"bias_mm", "mean_mm", "rms_mm", "p50_mm", "p90_mm", "p95_mm", "p99_mm", "max_mm"})
-      report().count(name, all["area"][name].get<double>());
-    // Both files appear, or none.
-    std::optional<StagedOutput> staged;
-    if (!report_file_.empty()) {
-      const std::string text = all.dump(1) + "\n";
-      staged.emplace(report_file_, StagedOutput::Kind::file);
-      writeFile(staged->path(), {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
-                report_file_);
-    }
-    if (!map_file_.empty()) writeMap(errors, all["map_range_mm"].get<double>());
-    if (staged) staged->commit();
-    if (json_) {
-      report().print(all.dump(1) + "\n");
-    } else if (report_file_.empty()) {
-      report().print(plainText(all));
-    }
+    measurement_.finish(std::move(mesh_), "grid " + name_, &lattice_, &*components_, report());
   }
 
  private:
-  void readReference() {
-    Mesh mesh = readMesh(reference_file_, [this](const std::string& text) { report().warn(text); });
-    placement_.factor = unitMm(unit_) * scale_;
-    place(mesh, placement_);
-    // Errors are measured to the triangles given, so that nothing is guessed in their place.
-    SolidMesh solid = solidMesh(std::move(mesh), {.guess = false, .find_walls = false});
-    if (solid.mesh.triangles.empty())
-      throw DataError(
-          "--reference: the mesh has no surface: all its triangles are degenerate or "
-          "cancel");
-    for (const std::string& line : solid.report.repairs.lines())
-      report().warn("--reference: " + line);
-    reference_.emplace(std::move(solid.mesh));
+  SurfaceMeasurement measurement_;
+  std::string name_;
+  Lattice lattice_;
+  std::optional<GridSurface> surface_;
+  std::optional<VoxelComponents> components_;
+  Mesh mesh_;
+};
+
+/// The surface of a mesh file.
+class MeasureMesh : public Tool {
+ public:
+  static bool takes(const std::string& file) { return !file.ends_with(".vdb"); }
+
+  void declare(Options& options) override {
+    options.positional("mesh", file_,
+                       "A mesh to measure, if there is no chain: " + meshFormatNames(), false);
+    measurement_.declare(options);
   }
 
-  /// Refuses to smooth a mesh that is not closed: borders would be measured as smoothing left them.
-  void checkClosed() const {
+  void run() override {
+    measurement_.begin(report());
+    Mesh mesh = readMesh(file_, [this](const std::string& text) { report().warn(text); });
+    if (measurement_.smooths()) checkClosed(mesh);
+    measurement_.finish(std::move(mesh), file_, nullptr, nullptr, report());
+  }
+
+ private:
+  /// Smoothing moves the border of an open mesh: measuring it would be meaningless.
+  void checkClosed(const Mesh& mesh) const {
     const std::vector<std::string> lines =
-        solidMesh(mesh_, {.guess = false, .find_walls = false}).report.repairs.lines();
+        solidMesh(mesh, {.guess = false, .find_walls = false}).report.repairs.lines();
     if (!lines.empty()) {
       throw DataError("--smooth: '" + file_ + "' is no closed mesh (" + lines.front() +
                       "); measure it as it is, or repair it first");
     }
   }
 
-  [[nodiscard]] ordered_json figures(const SurfaceErrors& errors) {
-    ordered_json all;
-    all["surface"] = json(mesh_);
-    all["surface"]["of"] = standsAlone() ? file_ : "grid " + name_;
-    all["surface"]["smoothing"] = smooth_ == "none" ? 0 : taubin_.iterations;
-    all["reference"] = json(reference_->mesh());
-    all["reference"]["of"] = reference_file_;
-    const double volume = all["surface"]["volume_mm3"];
-    const double wanted = all["reference"]["volume_mm3"];
-    all["volume_error_mm3"] = volume - wanted;
-    all["volume_error_percent"] = wanted != 0 ? 100 * (volume - wanted) / wanted : 0;
-    const ErrorStatistics by_area = statisticsByArea(errors);
-    all["area"] = json(by_area);
-    all["vertices"] = json(statisticsByVertex(errors));
-    const auto axes = axisErrors(errors, *reference_, standsAlone() ? nullptr : &lattice_);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      all["axes"][std::string(1, static_cast<char>('x' + axis))] = json(axes[axis]);
-    all["cutoff_mm"] = rules_.cutoff_mm;
-    all["margin_mm"] = rules_.margin_mm;
-    all["facets"] = ordered_json::array();
-    for (const FacetRoughness& facet : facetRoughness(errors, *reference_, rules_))
-      all["facets"].push_back(json(facet));
-    if (components_) {
-      const VoxelComponents::Counts counts = components_->finish();
-      all["components"] = json(counts.components);
-      all["cavities"] = json(counts.cavities);
-    }
-    all["map_range_mm"] = map_range_mm_ > 0 ? map_range_mm_ : by_area.percentile(99);
-    return all;
-  }
-
-  void writeMap(const SurfaceErrors& errors, double range_mm) const {
-    VertexExtras extras{true, true,
-                        "quality is the error in mm; blue is -" + shortestText(range_mm) +
-                            ", grey 0, red " + shortestText(range_mm)};
-    MeshWriter writer(map_file_, extras);
-    std::vector<std::array<std::uint8_t, 3>> colours;
-    std::vector<float> qualities;
-    for (std::size_t vertex = 0; vertex < errors.vertices; ++vertex) {
-      const double error = errors.error_mm[vertex];
-      colours.push_back(divergingColour(range_mm > 0 ? error / range_mm : 0));
-      qualities.push_back(static_cast<float>(error));
-    }
-    writer.add(mesh_.vertices, mesh_.triangles, 0, colours, qualities);
-    writer.commit();
-  }
-
   std::string file_;
-  std::string reference_file_;
-  std::string unit_ = "mm";
-  double scale_ = 1;
-  MeshPlacement placement_;
-  std::string grid_ = "auto";
-  std::string smooth_ = "none";
-  Taubin taubin_;
-  double spacing_mm_ = 0.1;
-  RoughnessRules rules_;
-  std::string report_file_;
-  std::string map_file_;
-  double map_range_mm_ = 0;
-  bool json_ = false;
-  bool overwrite_ = false;
-
-  std::string name_;
-  Lattice lattice_;
-  std::optional<GridSurface> surface_;
-  std::optional<VoxelComponents> components_;
-  std::optional<ClosestPoints> reference_;
-  Mesh mesh_;
+  SurfaceMeasurement measurement_;
 };
 
 }  // namespace
 
 extern const OperatorInfo measure;
 const OperatorInfo measure{
-    "measure", "How far a surface, printed or simulated, lies from the mesh that it should be",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! measure --reference "
-    "part.stl --report error.json",
-    []() -> std::unique_ptr<Operator> { return std::make_unique<Measure>(); }};
+    .name = "measure",
+    .summary = "How far a surface, printed or simulated, lies from the mesh that it should be",
+    .example =
+        "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! measure "
+        "--reference part.stl --report error.json",
+    .make = []() -> std::unique_ptr<Operator> { return std::make_unique<Measure>(); },
+    .on_file = {.takes = MeasureMesh::takes,
+                .make = []() -> std::unique_ptr<Tool> { return std::make_unique<MeasureMesh>(); }}};
 
 }  // namespace vdbdither

@@ -1,8 +1,8 @@
 #include <unistd.h>
 
 #include "io/vdb/slab_reader.h"
-#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 
@@ -10,13 +10,12 @@ namespace vdbdither {
 
 namespace {
 
-/// Slabs of a .vdb file, or frames of a pipe. Stands in at the head of a chain that begins without
-/// a source.
+/// Slabs of a .vdb file, or frames of a pipe. Begins every chain without another source.
 class ReadOperator : public Source {
  public:
   void declare(Options& options) override {
-    options.positional("file", path_, "The .vdb to read; - or nothing is standard input", false);
-    options.text("grids", names_, "NAME,NAME", "Only these grids");
+    options.positional("file", path_, "The .vdb to read; standard input if missing or -", false);
+    grids_.declare(options);
   }
 
   Schema plan() override {
@@ -25,26 +24,23 @@ class ReadOperator : public Source {
       throw UsageError(
           "nothing is piped in; name a source first (mesh2sdf part.stl), or a file: -i part.vdb");
     }
-    reader_ = std::make_unique<SlabReader>(
-        path_, names_.empty() ? std::vector<std::string>{} : commaList(names_));
+    reader_ = std::make_unique<SlabReader>(path_, grids_.list());
     return reader_->schema();
   }
 
   [[nodiscard]] bool isBarrier() const override { return !reader_->isPipe(); }
-  [[nodiscard]] double memoryBytes() const override { return reader_->memoryBytes(); }
+  [[nodiscard]] std::vector<Input*> inputs() override { return {reader_.get()}; }
   [[nodiscard]] std::optional<Work> work() const override {
-    constexpr double us_per_byte = 1.4e-3;
     double bytes = 0;
     for (const auto& [name, grid] : reader_->schema().grids) bytes += leafBytes(grid);
-    return Work{.us_per_held_leaf = us_per_byte * bytes};
+    return Work{.us_per_held_leaf = cost::read_us_per_byte * bytes};
   }
 
-  [[nodiscard]] Grids run(ZRange core) const override { return reader_->run(core); }
-  void drain() override { reader_->drain(); }
+  [[nodiscard]] Grids run(ZRange core) const override { return reader_->read(core); }
 
  private:
   std::string path_;
-  std::string names_;
+  GridListOption grids_;
   std::unique_ptr<SlabReader> reader_;
 };
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -10,17 +11,31 @@
 #include "io/image/exr.h"
 #include "io/image/picture.h"
 #include "io/image/png_runs.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/contour/voxel_faces.h"
 #include "ops/kernels/picture/ray_picture.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 
 namespace {
+
+constexpr std::array<Choice<Look>, 4> looks{
+    {{Look::area, "area", "A lamp of 30 cm, 1 m above, and some light from all around"},
+     {Look::large, "large", "A light of 2 m, 1 m above"},
+     {Look::sky, "sky", "The same light from everywhere above the horizon"},
+     {Look::staircase, "staircase",
+      "A lamp 10 degrees high on the left, so that every step casts a shadow"}}};
+
+enum class Projection { perspective, orthographic };
+constexpr std::array<Choice<Projection>, 2> projections{
+    {{Projection::perspective, "perspective", "As seen from --distance"},
+     {Projection::orthographic, "orthographic", "As seen from infinitely far away"}}};
 
 /// What a horizontal open place becomes where the user does not say: bright, but with room for what
 /// faces the light more.
@@ -33,131 +48,84 @@ std::uint8_t codedSrgb(double linear) {
   return static_cast<std::uint8_t>(std::lround(255 * coded));
 }
 
-class Render : public Sink {
+Mesh readMeshOf(const std::string& file, Reporter& reporter) {
+  return readMesh(file, [&](const std::string& text) { reporter.warn(text); });
+}
+
+/// Draws a surface, wherever it comes from, and writes the picture.
+class SurfacePicture {
  public:
-  void declare(Options& options) override {
-    options.positionals("files", files_,
-                        "The .png or .exr to write; before it, a mesh to draw in place of what "
-                        "comes down a chain: STL, OBJ or PLY");
-    options.text("grid", grid_, "NAME",
-                 "Whose surface comes down the chain: of solid its voxels, of printed, displaced "
-                 "and surface a level; auto takes the furthest down the chain");
-    options.flag("blocks", blocks_,
-                 "Draws the voxels that are inside as blocks, not their surface");
-    options.choice("look", look_, {look_names.begin(), look_names.end()},
-                   "The light: a lamp above, a large light above, a sky all around, or a lamp so "
-                   "low, from the left, that every step shows");
-    options.number("azimuth", camera_.azimuth_degrees, -360, 360,
-                   "From where it is seen: 0 from the front (-y), 90 from the right, in degrees");
-    options.number("elevation", camera_.elevation_degrees, -90, 90,
-                   "From how high: 90 from above, in degrees");
-    options.choice("projection", projection_, {"perspective", "orthographic"},
-                   "As from the eye's distance, or from infinitely far");
-    options.length("distance", distance_mm_, "From the eye to the middle of the object");
-    options.length("pixel", camera_.pixel_mm,
-                   "The side of a pixel at the middle of the object; by default what 50 cycles per "
-                   "degree need from 50 cm");
-    options.text("frame", frame_file_, "FILE",
+  void declare(Options& options) {
+    options.positional("picture", file_, "The .png or .exr to write");
+    surface_grid_.declare(options);
+    options.flag("blocks", blocks_, "Draws the voxels that are inside as blocks");
+    options.choice("look", look_, looks, "Light");
+    options.number("azimuth", camera_.azimuth_degrees, {-360, 360},
+                   "Direction of the eye in degrees: 0 is the front (-y), 90 the right");
+    options.number("elevation", camera_.elevation_degrees, {-90, 90},
+                   "Height of the eye in degrees: 90 is above");
+    options.choice("projection", projection_, projections, "Projection");
+    view_.declare(options);
+    options.file("frame", frame_file_, "FILE",
                  "Frames the picture as that of this mesh, so that pictures of its prints can be "
                  "compared with it pixel by pixel");
-    options.integer("margin", margin_, 0, 1000, "Pixels left free around it");
-    options.integer("samples", samples_, 1, 65536, "Rays for each pixel");
-    options.integer("seed", seed_, 0, 1 << 30, "Of the pattern of the rays");
-    options.number("brightness", brightness_, 0, 100,
-                   "What a horizontal open place becomes, linear, where 1 is white; 0 takes 0.6, "
-                   "and 0.2 where the light is low");
-    options.flag("overwrite", overwrite_, "Replace the picture if it is there");
+    options.integer("margin", margin_, {0, 1000}, "Pixels left free around the object");
+    options.integer("samples", samples_, {1, 65536}, "Rays for each pixel");
+    options.integer("seed", seed_, {0, 1 << 30}, "Seed of the pattern of the rays");
+    options.number("brightness", brightness_, Range::above(0, 100),
+                   "Linear brightness of an open horizontal place, where 1 is white",
+                   {"auto", "0.6, and 0.2 with --look staircase"});
+    overwrite_.declare(options, "the picture");
   }
 
-  [[nodiscard]] bool standsAlone() const override { return files_.size() == 2; }
-
-  void plan(const Schema& in) override {
-    if (files_.size() > 2)
-      throw UsageError("name the picture to write, and before it at most one mesh to draw");
-    const std::string& picture = files_.back();
-    if (!picture.ends_with(".png") && !picture.ends_with(".exr"))
-      throw UsageError("'" + picture + "' is no .png or .exr");
-    if (!(camera_.pixel_mm > 0)) throw UsageError("--pixel: must be more than 0 mm");
-    if (projection_ == "perspective") {
-      if (!(distance_mm_ > 0)) throw UsageError("--distance: must be more than 0 mm");
-      camera_.distance_mm = distance_mm_;
-    }
-    StagedOutput::check(picture, StagedOutput::Kind::file, overwrite_);
-    if (!frame_file_.empty()) frame(camera_, meshOf(frame_file_), margin_);
-    if (standsAlone()) {
-      if (blocks_) throw UsageError("--blocks: a mesh has no voxels");
-      return;
-    }
-    std::vector<std::string> there;
-    for (const auto& [name, grid] : in.grids) there.push_back(name);
-    name_ = chosenSurfaceGrid(there, grid_);
-    lattice_ = in.lattice;
-    surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
-    if (blocks_) faces_.emplace(in.lattice);
+  /// Makes every check that does not need the surface.
+  void begin(Reporter& reporter) {
+    if (!file_.ends_with(".png") && !file_.ends_with(".exr"))
+      throw UsageError("'" + file_ + "' must end in .png or .exr");
+    camera_.pixel_mm = view_.pixel_mm;
+    camera_.distance_mm = projection_ == Projection::perspective ? view_.distance_mm : 0;
+    StagedOutput::check(file_, StagedOutput::Kind::file, overwrite_.overwrite);
+    if (!frame_file_.empty()) frame(camera_, readMeshOf(frame_file_, reporter), margin_);
   }
 
-  [[nodiscard]] bool isBarrier() const override { return true; }
+  [[nodiscard]] const std::optional<std::string>& grid() const { return surface_grid_.grid; }
+  [[nodiscard]] bool drawsBlocks() const { return blocks_; }
 
-  [[nodiscard]] std::optional<Work> work() const override {
-    const std::optional<double> pixels = drawnPixels();
+  [[nodiscard]] std::optional<Work> work(const Lattice& lattice) const {
+    const std::optional<double> pixels = drawnPixels(lattice);
     if (!pixels) return std::nullopt;
-    return Work{.us_per_leaf = 1.4 * GridSurface::vertices_per_leaf,
-                .seconds = 1.1e-6 * *pixels * samples_};
+    return Work{.us_per_surface_leaf = cost::render_us * GridSurface::vertices_per_leaf,
+                .seconds = 1e-6 * cost::render_us_per_ray * *pixels * samples_};
   }
 
-  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
-    return std::vector<std::string>{name_};
-  }
-
-  void write(const Slab& in) override {
-    const GridConstPtr& grid = in.grids.at(name_);
-    if (!faces_) return append(mesh_, surface_->add(grid, in.core));
-    int z = in.core.begin;
-    for (BitLayer& layer : surface_->insideOf(grid, in.core))
-      append(mesh_, faces_->add(std::move(layer), z++));
-  }
-
-  void finish() override {
-    if (standsAlone()) {
-      mesh_ = meshOf(files_.front());
-    } else {
-      append(mesh_, faces_ ? faces_->finish() : surface_->finish());
-    }
-    if (mesh_.triangles.empty())
-      throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
-    if (frame_file_.empty()) frame(camera_, mesh_, margin_);
-    report().count("triangles", static_cast<double>(mesh_.triangles.size()));
-    const RayScene scene(mesh_);
-    mesh_ = {};
-    const auto look = static_cast<Look>(std::find(look_names.begin(), look_names.end(), look_) -
-                                        look_names.begin());
+  void finish(Mesh mesh, Reporter& reporter) {
+    if (frame_file_.empty()) frame(camera_, mesh, margin_);
+    reporter.count("triangles", static_cast<double>(mesh.triangles.size()));
+    const RayScene scene(mesh);
+    mesh = {};
     const RayPicture picture =
-        scene.picture(camera_, look, samples_, static_cast<std::uint32_t>(seed_),
-                      [this](double fraction) { report().progress(fraction); });
-    report().count("width", picture.width);
-    report().count("height", picture.height);
-    const double brightness = brightness_ > 0 ? brightness_ : brightnessOf(look);
+        scene.picture(camera_, look_, samples_, static_cast<std::uint32_t>(seed_),
+                      [&](double fraction) { reporter.progress(fraction); });
+    reporter.count("width", picture.width);
+    reporter.count("height", picture.height);
+    const double brightness = brightness_.value_or(brightnessOf(look_));
     const std::vector<std::uint8_t> bytes =
-        files_.back().ends_with(".exr") ? exrOf(picture, brightness) : pngOf(picture, brightness);
-    StagedOutput staged(files_.back(), StagedOutput::Kind::file);
-    writeFile(staged.path(), bytes, files_.back());
+        file_.ends_with(".exr") ? exrOf(picture, brightness) : pngOf(picture, brightness);
+    StagedOutput staged(file_, StagedOutput::Kind::file);
+    writeFile(staged.path(), bytes, file_);
     staged.commit();
   }
 
  private:
-  [[nodiscard]] Mesh meshOf(const std::string& file) const {
-    return readMesh(file, [this](const std::string& text) { report().warn(text); });
-  }
-
   /// About how many pixels show something; nothing where the picture may be refused.
-  [[nodiscard]] std::optional<double> drawnPixels() const {
+  [[nodiscard]] std::optional<double> drawnPixels(const Lattice& lattice) const {
     const auto pixels = [](const Camera& camera) { return 1.0 * camera.width * camera.height; };
     if (!frame_file_.empty()) return 0.55 * pixels(camera_);
     Mesh corners;
     for (int corner = 0; corner < 8; ++corner) {
-      openvdb::Vec3d at = lattice_.position(lattice_.box.min());
+      openvdb::Vec3d at = lattice.position(lattice.box.min());
       for (int axis = 0; axis < 3; ++axis) {
-        if ((corner >> axis & 1) != 0) at[axis] = lattice_.position(lattice_.box.max())[axis];
+        if ((corner >> axis & 1) != 0) at[axis] = lattice.position(lattice.box.max())[axis];
       }
       corners.vertices.push_back(at);
     }
@@ -198,20 +166,61 @@ class Render : public Sink {
         });
   }
 
-  std::vector<std::string> files_;
-  std::string grid_ = "auto";
+  std::string file_;
+  SurfaceGridOption surface_grid_;
   bool blocks_ = false;
-  std::string look_ = "area";
-  Camera camera_{.azimuth_degrees = 30, .elevation_degrees = 35, .pixel_mm = 0.0873};
-  std::string projection_ = "perspective";
-  double distance_mm_ = 500;
+  Look look_ = Look::area;
+  Camera camera_{.azimuth_degrees = 30, .elevation_degrees = 35};
+  Projection projection_ = Projection::perspective;
+  ViewOptions view_;
   std::string frame_file_;
   int margin_ = 8;
   int samples_ = 64;
   int seed_ = 0;
-  double brightness_ = 0;
-  bool overwrite_ = false;
+  std::optional<double> brightness_;
+  OverwriteOption overwrite_;
+};
 
+/// The surface of a grid, or its voxels.
+class Render : public Sink {
+ public:
+  void declare(Options& options) override { picture_.declare(options); }
+
+  void plan(const Schema& in) override {
+    std::vector<std::string> there;
+    for (const auto& [name, grid] : in.grids) there.push_back(name);
+    name_ = chosenSurfaceGrid(there, picture_.grid());
+    lattice_ = in.lattice;
+    surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
+    if (picture_.drawsBlocks()) faces_.emplace(in.lattice);
+    picture_.begin(report());
+  }
+
+  [[nodiscard]] bool isBarrier() const override { return true; }
+
+  [[nodiscard]] std::optional<Work> work() const override { return picture_.work(lattice_); }
+
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    return std::vector<std::string>{name_};
+  }
+
+  void write(const Slab& in) override {
+    const GridConstPtr& grid = in.grids.at(name_);
+    if (!faces_) return append(mesh_, surface_->add(grid, in.core));
+    int z = in.core.begin;
+    for (BitLayer& layer : surface_->insideOf(grid, in.core))
+      append(mesh_, faces_->add(std::move(layer), z++));
+  }
+
+  void finish() override {
+    append(mesh_, faces_ ? faces_->finish() : surface_->finish());
+    if (mesh_.triangles.empty())
+      throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
+    picture_.finish(std::move(mesh_), report());
+  }
+
+ private:
+  SurfacePicture picture_;
   std::string name_;
   Lattice lattice_;
   std::optional<GridSurface> surface_;
@@ -219,13 +228,40 @@ class Render : public Sink {
   Mesh mesh_;
 };
 
+/// The surface of a mesh file.
+class RenderMesh : public Tool {
+ public:
+  static bool takes(const std::string& file) { return !file.ends_with(".vdb"); }
+
+  void declare(Options& options) override {
+    options.positional("mesh", file_, "A mesh to draw, if there is no chain: " + meshFormatNames(),
+                       false);
+    picture_.declare(options);
+  }
+
+  void run() override {
+    picture_.begin(report());
+    if (picture_.drawsBlocks()) throw UsageError("--blocks: a mesh has no voxels");
+    Mesh mesh = readMeshOf(file_, report());
+    picture_.finish(std::move(mesh), report());
+  }
+
+ private:
+  std::string file_;
+  SurfacePicture picture_;
+};
+
 }  // namespace
 
 extern const OperatorInfo render;
 const OperatorInfo render{
-    "render", "A picture of a surface, printed, simulated or meant, as the eye would see it",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! render print.png --frame "
-    "part.stl",
-    []() -> std::unique_ptr<Operator> { return std::make_unique<Render>(); }};
+    .name = "render",
+    .summary = "A picture of a surface, printed, simulated or meant, as the eye would see it",
+    .example =
+        "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! render print.png "
+        "--frame part.stl",
+    .make = []() -> std::unique_ptr<Operator> { return std::make_unique<Render>(); },
+    .on_file = {.takes = RenderMesh::takes,
+                .make = []() -> std::unique_ptr<Tool> { return std::make_unique<RenderMesh>(); }}};
 
 }  // namespace vdbdither

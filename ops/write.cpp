@@ -1,3 +1,4 @@
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -9,9 +10,11 @@
 
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
+#include "io/mesh/mesh_format.h"
 #include "io/vdb/frames.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
@@ -20,6 +23,11 @@
 namespace vdbdither {
 
 namespace {
+
+constexpr std::array<Choice<VdbCodec>, 3> codecs{
+    {{VdbCodec::blosc, "blosc", "Active voxels, compressed by Blosc"},
+     {VdbCodec::mask, "mask", "Active voxels, uncompressed"},
+     {VdbCodec::none, "none", "All voxels of each leaf, uncompressed"}}};
 
 /// All slabs of a grid in one, in canonical form; `pieces` is empty then.
 GridConstPtr whole(std::vector<Layers>& pieces, ZRange layers) {
@@ -38,15 +46,17 @@ GridConstPtr whole(std::vector<Layers>& pieces, ZRange layers) {
   return own;
 }
 
-/// Slabs into one .vdb file, or as frames on a pipe. Stands in at the end of a chain that ends
-/// without a sink; in the middle it archives the stage.
+/// Slabs into one .vdb file, or as frames on a pipe. Ends every chain without another sink; in the
+/// middle of a chain it archives the stage.
 class WriteOperator : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", path_, "The .vdb to write; - or nothing is standard output", false);
-    options.choice("codec", codec_, {"blosc", "mask", "none"}, "How a file's voxels are packed");
-    options.flag("half", half_, "A file's distances, normals and the like take 16 bits, not 32");
-    options.flag("overwrite", overwrite_, "Replace the file if it is there");
+    options.positional("file", path_, "The .vdb to write; standard output if missing or -", false);
+    options.choice("codec", codec_, codecs, "Compression of the voxels in a file");
+    options.flag("half", half_,
+                 "Stores distances, normals and other fractional numbers of a file in 16 bits, not "
+                 "32");
+    overwrite_.declare(options, "the file");
   }
 
   void plan(const Schema& in) override {
@@ -54,7 +64,7 @@ class WriteOperator : public Sink {
     if (in.grids.empty()) throw UsageError("there is no grid to write");
     if (!isPipe()) {
       refuseOtherFormats();
-      StagedOutput::check(path_, StagedOutput::Kind::file, overwrite_);
+      StagedOutput::check(path_, StagedOutput::Kind::file, overwrite_.overwrite);
       output_.emplace(path_, StagedOutput::Kind::file);
     } else if (::isatty(dataOutput())) {
       throw UsageError(
@@ -66,7 +76,7 @@ class WriteOperator : public Sink {
 
   [[nodiscard]] bool isBarrier() const override { return !isPipe(); }
   [[nodiscard]] OutputEstimate output() const override {
-    if (isPipe()) return {};
+    if (isPipe()) return {"-", 0};
     // Measured on spheres and bunnies: what is active, packed. Bits are not packed, and noise
     // cannot be, which a grid of no class may hold.
     double per_leaf = 0;
@@ -78,15 +88,13 @@ class WriteOperator : public Sink {
       const double unpacked = half_ ? 0.5 : 1;
       per_leaf += leafBytes(grid) * (bits ? 1.1 : noise ? unpacked : packed);
     }
-    return {path_, schema_.leaves * per_leaf};
+    return {path_, schema_.footprint.total * per_leaf};
   }
   [[nodiscard]] std::optional<Work> work() const override {
-    constexpr double us_per_byte = 4e-3;
     double bytes = 0;
     for (const auto& [name, grid] : schema_.grids) bytes += leafBytes(grid);
-    return Work{.us_per_held_leaf = us_per_byte * bytes};
+    return Work{.us_per_held_leaf = cost::write_us_per_byte * bytes};
   }
-  [[nodiscard]] bool writesToStandardOutput() const override { return isPipe(); }
 
   void write(const Slab& in) override {
     if (frames_) {
@@ -113,10 +121,7 @@ class WriteOperator : public Sink {
       contents.metadata[layers_key] =
           std::to_string(written_.begin) + " " + std::to_string(written_.end);
     }
-    const VdbCodec codec = codec_ == "none"   ? VdbCodec::none
-                           : codec_ == "mask" ? VdbCodec::mask
-                                              : VdbCodec::blosc;
-    writeVdb(output_->path(), contents, codec, path_, half_);
+    writeVdb(output_->path(), contents, codec_, path_, half_);
     output_->commit();
   }
 
@@ -124,13 +129,11 @@ class WriteOperator : public Sink {
   [[nodiscard]] bool isPipe() const { return path_.empty() || path_ == "-"; }
 
   void refuseOtherFormats() const {
+    if (meshFormatNamedBy(path_) != nullptr)
+      throw UsageError("'" + path_ +
+                       "' is a mesh by its name, and this is a .vdb; mesh-export "
+                       "writes meshes");
     const std::string extension = std::filesystem::path(path_).extension();
-    for (const char* mesh : {".stl", ".obj", ".ply"}) {
-      if (extension == mesh)
-        throw UsageError("'" + path_ +
-                         "' is a mesh by its name, and this is a .vdb; mesh-export "
-                         "writes meshes");
-    }
     for (const char* picture : {".png", ".tif", ".tiff", ".exr", ".zip"}) {
       if (extension == picture)
         throw UsageError("'" + path_ +
@@ -144,9 +147,9 @@ class WriteOperator : public Sink {
   }
 
   std::string path_;
-  std::string codec_ = "blosc";
+  VdbCodec codec_ = VdbCodec::blosc;
   bool half_ = false;
-  bool overwrite_ = false;
+  OverwriteOption overwrite_;
   Schema schema_;
   std::optional<FrameWriter> frames_;
   bool begun_ = false;
@@ -158,8 +161,12 @@ class WriteOperator : public Sink {
 }  // namespace
 
 extern const OperatorInfo write{
-    "write", "Grids into a .vdb file or to standard output",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! dither -o solid.vdb",
-    [] { return std::unique_ptr<Operator>(std::make_unique<WriteOperator>()); }, true};
+    .name = "write",
+    .summary = "Grids into a .vdb file or to standard output",
+    .example =
+        "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! dither -o solid.vdb",
+    .make = []() -> std::unique_ptr<Operator> { return std::make_unique<WriteOperator>(); },
+    .transport = true,
+    .names_vdb = true};
 
 }  // namespace vdbdither

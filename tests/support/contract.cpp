@@ -1,6 +1,7 @@
 #include "tests/support/contract.h"
 
 #include "io/vdb/vdb.h"
+#include "tests/support/filters.h"
 #include "tests/support/slabs.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
@@ -19,17 +20,24 @@ std::string digest(const GridConstPtr& grid, ZRange range) {
   return archiveBytes({{{"grid", pruned(joinLayers(pieces, range))}}, {}}, VdbCodec::mask);
 }
 
+/// What the filter gets for `core`, its inputs included.
+Slab slabOf(Filter& filter, const Schema& in, const Grids& whole, ZRange core) {
+  Slab slab = slabFor(filter, in.lattice, whole, core);
+  addInputs(filter, slab);
+  return slab;
+}
+
 std::string layersText(ZRange range) {
   return "layers " + std::to_string(range.begin) + " to " + std::to_string(range.end - 1);
 }
 
 }  // namespace
 
-std::string firstBreach(const Filter& filter, const Schema& in, const Grids& whole, int height) {
+std::string firstBreach(Filter& filter, const Schema& in, const Grids& whole, int height) {
   const ZRange layers = in.lattice.layers();
-  const Grids expected = filter.run(slabFor(filter, in.lattice, whole, layers));
+  const Grids expected = filter.run(slabOf(filter, in, whole, layers));
   for (const ZRange core : slabsOf(layers, height)) {
-    const Slab slab = slabFor(filter, in.lattice, whole, core);
+    const Slab slab = slabOf(filter, in, whole, core);
     std::map<std::string, std::string> before;
     for (const auto& [name, grid] : slab.grids) before[name] = digest(grid, layers);
     const Grids made = filter.run(slab);
@@ -52,6 +60,7 @@ std::string firstBreach(const Filter& filter, const Schema& in, const Grids& who
     }
     Slab empty{core, slab.valid, {}};
     for (const Read& read : filter.reads()) empty.grids[read.grid] = in.grids.at(read.grid);
+    addInputs(filter, empty);
     if (filter.run(empty).size() != made.size()) return "it makes other grids of an empty slab";
   }
   return "";

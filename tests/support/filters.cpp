@@ -31,18 +31,29 @@ Schema ballWithBand(const Lattice& lattice, double radius_mm, double band_mm) {
   return schemaOf(lattice, {{"surface", sampled(sphere({0, 0, 0}, radius_mm), lattice, band_mm)}});
 }
 
+void addInputs(Filter& filter, Slab& slab) {
+  for (Input* input : filter.inputs()) {
+    const ZRange there = intersection(slab.core, input->schema().lattice.layers());
+    slab.inputs.push_back(there.empty() ? Grids() : input->read(there));
+  }
+}
+
 Grids runWhole(Filter& filter, const Schema& schema) {
   filter.plan(schema);
   Slab slab{schema.lattice.layers(), schema.lattice.layers(), {}};
   for (const Read& read : filter.reads()) slab.grids[read.grid] = schema.grids.at(read.grid);
+  addInputs(filter, slab);
   return filter.run(slab);
 }
 
 std::vector<std::pair<ZRange, Grids>> runInSlabs(Filter& filter, const Schema& schema, int height) {
   filter.plan(schema);
   std::vector<std::pair<ZRange, Grids>> results;
-  for (const ZRange core : slabsOf(schema.lattice.layers(), height))
-    results.emplace_back(core, filter.run(slabFor(filter, schema.lattice, schema.grids, core)));
+  for (const ZRange core : slabsOf(schema.lattice.layers(), height)) {
+    Slab slab = slabFor(filter, schema.lattice, schema.grids, core);
+    addInputs(filter, slab);
+    results.emplace_back(core, filter.run(slab));
+  }
   return results;
 }
 

@@ -17,9 +17,10 @@ namespace vdbdither {
 inline constexpr std::array<std::string_view, 4> surface_grids{printed_grid, solid_grid,
                                                                displaced_grid, surface_grid};
 
-/// Returns `wanted`, or for "auto" the first of `surface_grids` that is in `there`. Throws
+/// Returns `wanted`, or without it the first of `surface_grids` that is in `there`. Throws
 /// DataError if there is none.
-std::string chosenSurfaceGrid(std::span<const std::string> there, const std::string& wanted);
+std::string chosenSurfaceGrid(std::span<const std::string> there,
+                              const std::optional<std::string>& wanted);
 
 /// The surface that a grid represents: the voxels of a bool grid, the level 0 of a level set, the
 /// level ½ of a fog volume (an occupancy).

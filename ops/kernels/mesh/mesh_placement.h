@@ -1,9 +1,6 @@
 #pragma once
 
-#include <array>
 #include <span>
-#include <string_view>
-#include <utility>
 #include <vector>
 
 #include <openvdb/Types.h>
@@ -29,12 +26,5 @@ void place(std::span<Mesh> meshes, const MeshPlacement& placement);
 inline void place(Mesh& mesh, const MeshPlacement& placement) {
   place(std::span(&mesh, 1), placement);
 }
-
-/// The units of a mesh file, and mm per unit.
-inline constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{
-    {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}, {"um", 0.001}}};
-
-/// Returns mm per `unit`, which must be one of them.
-double unitMm(std::string_view unit);
 
 }  // namespace vdbdither

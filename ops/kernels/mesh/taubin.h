@@ -12,9 +12,6 @@ struct Taubin {
   double lambda = 0.5;
   double mu = -0.53;
   int iterations = 160;
-
-  /// The approximate CPU time of `smooth` per vertex.
-  [[nodiscard]] double usPerVertex() const { return 0.25 + 0.022 * iterations; }
 };
 
 /// Smooths a closed mesh, each side of which must be met by exactly one other in the opposite
