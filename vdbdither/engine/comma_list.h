@@ -6,8 +6,8 @@
 
 namespace vdbdither {
 
-/// What commas part, blanks and all: one piece more than there are commas, so of an empty text one
-/// that is empty.
+/// Returns the pieces of `text` between commas, with their blanks. An empty text has one piece,
+/// which is empty.
 std::vector<std::string> commaList(std::string_view text);
 
 }  // namespace vdbdither

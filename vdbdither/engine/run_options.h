@@ -6,8 +6,8 @@
 
 namespace vdbdither {
 
-/// The options that every operator takes. They concern the run as a whole, wherever in a chain they
-/// stand.
+/// The options that every operator takes. They apply to the whole job, whichever operator of a
+/// chain they follow.
 struct RunOptions {
   std::string input;   ///< .vdb for a chain that begins without a source; empty: standard input
   std::string output;  ///< .vdb for a chain that ends without a sink; empty: standard output
@@ -27,13 +27,13 @@ struct RunOptions {
   void declare(Options& options);
 };
 
-/// A size such as 512MiB, 4GiB, 2e9 (bytes). Throws UsageError.
+/// Reads a size such as 512MiB, 4GiB, 2e9 (bytes). Throws UsageError.
 double parseBytes(const std::string& text);
 
-/// 1.5 GiB, 12 MiB, 640 B.
+/// Returns `1.5 GiB`, `12 MiB`, `640 B`.
 std::string bytesText(double bytes);
 
-/// `0.4 s`, `12 s`, `3 min`, `2.5 h`: two digits, for estimates.
+/// Returns `0.4 s`, `12 s`, `3 min`, `2.5 h`: two digits, for estimates.
 std::string durationText(double seconds);
 
 }  // namespace vdbdither
