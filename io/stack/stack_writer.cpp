@@ -7,7 +7,7 @@
 #include <tbb/task_arena.h>
 
 #include "io/file/digest.h"
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -25,7 +25,7 @@ std::vector<std::uint32_t> displayColours(const MaterialTable& materials) {
 /// A layer on its way through the threads.
 struct StackWriter::Layer {
   int z = 0;
-  RunImage image;
+  SpanImage image;
   std::vector<SliceFile> files;
   std::vector<std::string> sha256;    ///< of each of the files
   std::vector<std::uint64_t> voxels;  ///< of each material
@@ -37,12 +37,12 @@ StackWriter::StackWriter(const std::filesystem::path& target, Manifest stack, Sl
       names_(std::move(names)),
       encoder_(encoder),
       output_(target),
-      preview_(stack_.lattice.pitch_mm, stack_.frame.width(), stack_.frame.height(),
+      preview_(stack_.lattice.pitch_mm, stack_.layout.width(), stack_.layout.height(),
                stack_.lattice.layers(), displayColours(stack_.materials)) {
   stack_.voxels.assign(stack_.materials.size(), 0);
 }
 
-void StackWriter::add(ZRange layers, std::vector<RunImage> images, const Grids& grids) {
+void StackWriter::add(ZRange layers, std::vector<SpanImage> images, const Grids& grids) {
   // They are kept here, for TBB forgets what is on its way when one of the steps fails.
   std::vector<Layer> all(images.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -93,14 +93,14 @@ std::vector<std::uint64_t> StackWriter::countedVoxels(const Layer& layer) const 
   std::vector<std::uint64_t> voxels(stack_.materials.size(), 0);
   for (std::uint32_t y = 0; y < layer.image.height; ++y) {
     std::uint32_t begin = 0;
-    for (const Run& run : layer.image.row(y)) {
-      if (run.value > voxels.size()) {
+    for (const Span& span : layer.image.row(y)) {
+      if (span.value > voxels.size()) {
         throw DataError("layer " + std::to_string(layer.z) + " holds material " +
-                        std::to_string(static_cast<std::int32_t>(run.value)) +
+                        std::to_string(static_cast<std::int32_t>(span.value)) +
                         ", but the table of materials ends at " + std::to_string(voxels.size()));
       }
-      if (run.value > 0) voxels[run.value - 1] += run.end - begin;
-      begin = run.end;
+      if (span.value > 0) voxels[span.value - 1] += span.end - begin;
+      begin = span.end;
     }
   }
   return voxels;

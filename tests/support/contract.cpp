@@ -17,7 +17,7 @@ using openvdb::CoordBBox;
 std::string digest(const GridConstPtr& grid, ZRange range) {
   // A range of leaves never equals that of a whole grid, so the join copies and removes the voxels
   // outside.
-  const std::vector<Layers> pieces{{grid, {range.begin - 4096, range.end + 4096}}};
+  const std::vector<GridLayers> pieces{{grid, {range.begin - 4096, range.end + 4096}}};
   return archiveBytes({{{"grid", pruned(joinLayers(pieces, range))}}, {}}, VdbCodec::mask);
 }
 
