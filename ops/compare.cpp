@@ -6,8 +6,8 @@
 
 #include "io/vdb/slab_reader.h"
 #include "ops/kernels/measure/grid_difference.h"
-#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
@@ -24,11 +24,11 @@ class Compare : public Sink {
  public:
   void declare(Options& options) override {
     options.positionals("file", paths_,
-                        "Two .vdb files, or one that what comes is compared with; named pipes do");
-    options.number("tolerance", tolerance_, 0, std::numeric_limits<double>::infinity(),
-                   "Values this close count as equal");
-    options.text("grids", names_, "NAME,NAME", "Only these grids");
-    options.flag("json", json_, "Say it as JSON");
+                        "Two .vdb files or named pipes, or one to compare with the volume that "
+                        "reaches this step");
+    options.number("tolerance", tolerance_, {.min = 0}, "Maximum difference of equal values");
+    grids_.declare(options);
+    json_.declare(options);
   }
 
   [[nodiscard]] std::string inputFile() const override {
@@ -40,13 +40,11 @@ class Compare : public Sink {
   void plan(const Schema& in) override {
     schema_ = in;
     other_ = std::make_unique<SlabReader>(paths_.back(), std::vector<std::string>());
-    std::vector<std::string> names;
-    if (names_.empty()) {
+    std::vector<std::string> names = grids_.list();
+    if (names.empty()) {
       for (const Grids* grids : {&in.grids, &other_->schema().grids}) {
         for (const auto& [name, grid] : *grids) names.push_back(name);
       }
-    } else {
-      names = commaList(names_);
     }
     for (const std::string& name : names) {
       Finding& finding = findings_[name];
@@ -92,7 +90,7 @@ class Compare : public Sink {
     for (const auto& [name, finding] : findings_) {
       if (!finding.equal()) summary += (summary.empty() ? "" : "; ") + finding.text(name);
     }
-    report().print(json_ ? jsonText() : summary.empty() ? "equal\n" : "");
+    report().print(json_.json ? jsonText() : summary.empty() ? "equal\n" : "");
     if (!summary.empty()) throw DataError("not equal to '" + paths_.back() + "': " + summary);
   }
 
@@ -176,8 +174,8 @@ class Compare : public Sink {
 
   std::vector<std::string> paths_;
   double tolerance_ = 0;
-  std::string names_;
-  bool json_ = false;
+  GridListOption grids_;
+  JsonOption json_;
   Schema schema_;
   std::unique_ptr<SlabReader> other_;
   std::map<std::string, Finding> findings_;

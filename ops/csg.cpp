@@ -1,5 +1,6 @@
 #include "ops/kernels/distance/csg.h"
 
+#include <array>
 #include <memory>
 #include <string>
 
@@ -17,6 +18,11 @@ namespace {
 using openvdb::FloatGrid;
 using openvdb::Int32Grid;
 
+enum class Priority { first, second };
+constexpr std::array<Choice<Priority>, 2> priorities{
+    {{Priority::first, "first", "That of the volume that reaches this step"},
+     {Priority::second, "second", "That of the file"}}};
+
 std::string latticeText(const Lattice& lattice) {
   std::string text;
   for (int axis = 0; axis < 3; ++axis)
@@ -28,11 +34,11 @@ std::string latticeText(const Lattice& lattice) {
 class CsgOperator : public Filter {
  public:
   void declare(Options& options) override {
-    options.text("union", unite_, "FILE.vdb", "Adds the surface of this file or named pipe");
-    options.text("intersection", intersect_, "FILE.vdb", "Keeps what lies in this one, too");
-    options.text("difference", subtract_, "FILE.vdb", "Takes this one away");
-    options.choice("priority", priority_, {"first", "second"},
-                   "Whose part, and so whose material, is it where both are: of a union");
+    options.file("union", unite_, "FILE.vdb", "Adds the surface of this file or named pipe");
+    options.file("intersection", intersect_, "FILE.vdb", "Keeps what also lies in this one");
+    options.file("difference", subtract_, "FILE.vdb", "Removes this one");
+    options.choice("priority", priority_, priorities,
+                   "Whose part, and so whose material, a union has where both are");
   }
 
   Schema plan(const Schema& in) override {
@@ -94,7 +100,7 @@ class CsgOperator : public Filter {
                                   ? findGrid<Int32Grid>(second, part_grid)
                                   : nullptr;
     const auto united = unitedParts(*surface, *others, parts.get(), others_parts.get(),
-                                    first_parts_, priority_ == "second", in.core);
+                                    first_parts_, priority_ == Priority::second, in.core);
     united->insertMeta(*emptyParts(*surface));
     out[part_grid] = united;
     return out;
@@ -137,7 +143,7 @@ class CsgOperator : public Filter {
   std::string unite_;
   std::string intersect_;
   std::string subtract_;
-  std::string priority_ = "first";
+  Priority priority_ = Priority::first;
 
   Csg operation_ = Csg::unite;
   std::unique_ptr<SlabReader> other_;

@@ -1,9 +1,13 @@
 #include <algorithm>
-#include <charconv>
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <limits>
+#include <optional>
+#include <span>
 
 #include "io/file/data_files.h"
+#include "io/file/digest.h"
 #include "io/vdb/mask_cache.h"
 #include "io/vdb/vdb.h"
 #include "ops/kernels/dither/shape_dither.h"
@@ -20,6 +24,32 @@ namespace {
 
 using openvdb::FloatGrid;
 using openvdb::Vec3SGrid;
+
+enum class MaskSource { blue, paper, white, none, file };
+constexpr std::array<Choice<MaskSource>, 4> mask_sources{
+    {{MaskSource::blue, "blue", "Blue noise, installed with the program"},
+     {MaskSource::paper, "paper", "Blue noise of Morsy et al. (2022), made once and cached"},
+     {MaskSource::white, "white", "White noise"},
+     {MaskSource::none, "none", "No thresholds: voxels whose centre is inside are printed"}}};
+
+constexpr std::array<Choice<DitherAt>, 3> places{
+    {{DitherAt::closest, "closest", "At the closest surface voxel"},
+     {DitherAt::foot, "foot", "At the voxel that contains the closest point of the surface"},
+     {DitherAt::voxel, "voxel", "At the voxel itself"}}};
+
+enum class Guard { walls, none };
+constexpr std::array<Choice<Guard>, 2> guards{
+    {{Guard::walls, "walls", "Leaves walls and gaps that are too thin for the dither as they are"},
+     {Guard::none, "none", "Dithers everything"}}};
+
+enum class Preset { best, paper };
+constexpr std::array<Choice<Preset>, 2> presets{
+    {{Preset::best, "best",
+      "Minimum error after printing: --mask blue --amplitude adapted --at voxel --guard walls"},
+     {Preset::paper, "paper",
+      "The method of Morsy et al. (2022): --mask paper --amplitude 4 --at closest --guard none"}}};
+
+const Word adapted{"adapted", "Adapted to each facet, by its normal and --spread"};
 
 ThresholdMask readMask(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path)) {
@@ -39,30 +69,31 @@ ThresholdMask readMask(const std::filesystem::path& path) {
 class Dither : public Filter {
  public:
   void declare(Options& options) override {
-    options.text("mask", mask_, "preset|blue|paper|white|none|FILE.vdb",
-                 "Thresholds: the installed blue noise, the paper's, white noise, none (plain "
-                 "voxels), or a tile of your own");
-    options.choice("preset", preset_, {"best", "paper"},
-                   "What 'preset' stands for elsewhere: blue, adapted, voxel and walls; or the "
-                   "paper's mask, 4, closest and none");
-    options.text("amplitude", amplitude_, "preset|adapted|N",
-                 "Half of it voxel diameters peak to peak, along the normal, up to 8; or adapted "
-                 "to each facet, by its normal and the spread");
-    options.choice("at", at_, {"preset", "closest", "foot", "voxel"},
-                   "Where the mask is read: at the closest surface voxel, at the voxel of the foot "
-                   "point, or at the voxel itself");
-    options.choice("guard", guard_, {"preset", "walls", "none"},
-                   "What is spared: walls and gaps too thin for the dither, or nothing");
-    options.length("spread", spread_mm_,
-                   "How far the printing process blurs, a standard deviation, for the adapted "
-                   "amplitude");
-    options.number("sigma", sigma_, 0, 16,
-                   "Another standard deviation of the blue noise, voxels, at least 0.3; made once "
-                   "and kept in the cache folder");
-    options.integer("size", size_, 0, 256, "Another period of the blue noise, voxels; likewise");
-    options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the noise");
+    options.preset<Preset>(
+        "preset", preset_, presets, [this](Preset preset) { fill(preset); },
+        "Defaults of the four options that follow");
+    options.choiceOrFile("mask", mask_, mask_sources, MaskSource::file, mask_file_, "FILE.vdb",
+                         "Thresholds: one of these masks, or the tile of a file");
+    options.number("amplitude", amplitude_, {0, 8},
+                   "Amplitude along the normal, peak to peak, in halves of a voxel diameter",
+                   adapted);
+    options.choice("at", at_, places, "Where the mask is read");
+    options.choice("guard", guard_, guards, "What is left undithered");
+    options.length("spread", spread_mm_, {0.01, 1},
+                   "Standard deviation of the blur of the printing process, which the adapted "
+                   "amplitude allows for");
+    options.number("sigma", sigma_, {0.3, 16},
+                   "Standard deviation of the Gaussian of --mask blue or paper, in voxels; another "
+                   "mask is made with it once and cached");
+    options.integer("size", size_, {1, 256},
+                    "Period of --mask blue or paper, in voxels; another mask is made with it once "
+                    "and cached");
+    options.integer("seed", seed_, {0, std::numeric_limits<int>::max()},
+                    "Seed of the noise of the mask");
+    options.text("mask-digest", mask_digest_, "HEX",
+                 "Refuses a mask of another digest, which the history of a file records");
     options.flag("displaced", displaced_,
-                 "Adds the grid 'displaced', the displaced distances in mm");
+                 "Adds the grid 'displaced' with the displaced distances in mm");
   }
 
   Schema plan(const Schema& in) override {
@@ -71,18 +102,11 @@ class Dither : public Filter {
     if (has_normals_) findGrid<Vec3SGrid>(in.grids, normal_grid);
 
     dither_.pitch_mm = in.lattice.pitch_mm;
-    const bool best = preset_ == "best";
-    const auto chosen = [](const std::string& given, const std::string& by_preset) {
-      return given == "preset" ? by_preset : given;
-    };
-    const std::string at = chosen(at_, best ? "voxel" : "closest");
-    dither_.at = at == "closest" ? DitherAt::closest
-                 : at == "foot"  ? DitherAt::foot
-                                 : DitherAt::voxel;
-    dither_.guarded = chosen(guard_, best ? "walls" : "none") == "walls";
-    const std::string mask_name = chosen(mask_, best ? "blue" : "paper");
-    dither_.mask = mask(mask_name);
-    planAmplitude(mask_name == "none" ? "0" : chosen(amplitude_, best ? "adapted" : "4"));
+    dither_.at = at_;
+    dither_.guarded = guard_ == Guard::walls;
+    dither_.mask = mask();
+    checkDigest();
+    planAmplitude();
     checkBand(surface->background());
 
     Schema out = in;
@@ -121,37 +145,37 @@ class Dither : public Filter {
   }
 
  private:
-  void planAmplitude(const std::string& text) {
-    dither_.adapted = nullptr;
-    if (text == "adapted") {
-      if (!(spread_mm_ >= 0.01 && spread_mm_ <= 1))
-        throw UsageError("--spread: " + shortestText(spread_mm_) +
-                         " mm is not between 0.01 mm and 1 mm");
-      dither_.amplitude = 2;
-      dither_.adapted = std::make_shared<AdaptedAmplitude>(dither_.pitch_mm, spread_mm_);
-    } else {
-      double constant = -1;
-      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), constant);
-      if (error != std::errc() || end != text.data() + text.size() ||
-          !(constant >= 0 && constant <= 8))
-        throw UsageError("--amplitude: '" + text +
-                         "' is neither 'adapted' nor a number from 0 to 8");
-      dither_.amplitude = constant;
-    }
+  void fill(Preset preset) {
+    const bool best = preset == Preset::best;
+    mask_ = best ? MaskSource::blue : MaskSource::paper;
+    amplitude_ = best ? std::nullopt : std::optional(4.0);
+    at_ = best ? DitherAt::voxel : DitherAt::closest;
+    guard_ = best ? Guard::walls : Guard::none;
   }
 
-  [[nodiscard]] ThresholdMask mask(const std::string& name) const {
-    if (name != "blue" && name != "paper") {
-      for (const auto& [option, given] :
-           {std::pair("--sigma", sigma_ != 0), {"--size", size_ != 0}})
-        if (given)
-          throw UsageError(std::string(option) + ": of the blue noise, and --mask is '" + name +
-                           "'; blue and paper take it");
+  void planAmplitude() {
+    if (mask_ == MaskSource::none) amplitude_ = 0;
+    dither_.amplitude = amplitude_.value_or(2);
+    dither_.adapted =
+        amplitude_ ? nullptr : std::make_shared<AdaptedAmplitude>(dither_.pitch_mm, spread_mm_);
+  }
+
+  [[nodiscard]] bool isBlueNoise() const {
+    return mask_ == MaskSource::blue || mask_ == MaskSource::paper;
+  }
+
+  [[nodiscard]] ThresholdMask mask() const {
+    for (const auto& [option, given] :
+         {std::pair("--sigma", sigma_.has_value()), {"--size", size_.has_value()}}) {
+      if (given && !isBlueNoise())
+        throw UsageError(std::string(option) +
+                         ": only --mask blue and --mask paper have it; leave it out");
     }
-    if (name == "none") return ThresholdMask::constant(0.5F);
-    if (name == "white") return ThresholdMask::whiteNoise(static_cast<std::uint64_t>(seed_));
-    if (name != "blue" && name != "paper") return readMask(name);
-    if (name == "paper" || sigma_ != 0 || size_ != 0 || seed_ != 1) return madeMask(name);
+    if (mask_ == MaskSource::none) return ThresholdMask::constant(0.5F);
+    if (mask_ == MaskSource::white)
+      return ThresholdMask::whiteNoise(static_cast<std::uint64_t>(seed_));
+    if (mask_ == MaskSource::file) return readMask(mask_file_);
+    if (mask_ == MaskSource::paper || sigma_ || size_ || seed_ != 1) return madeMask();
     const auto installed = findDataFile("masks/blue.vdb");
     if (!installed)
       throw UsageError(
@@ -160,17 +184,35 @@ class Dither : public Filter {
     return readMask(*installed);
   }
 
-  /// Out of the user's cache, or new.
-  [[nodiscard]] ThresholdMask madeMask(const std::string& name) const {
-    VoidAndCluster settings = name == "paper" ? paperMask() : defaultMask();
-    if (sigma_ != 0) {
-      if (sigma_ < 0.3) {
-        throw UsageError("--sigma: " + shortestText(sigma_) +
-                         " is out of range; 0.3 to 16 are accepted");
-      }
-      settings.kernel.sigma = openvdb::Vec3d(sigma_);
+  /// Resolves the digest of a mask that is a tile, for the history.
+  void checkDigest() {
+    if (!isBlueNoise() && mask_ != MaskSource::file) {
+      if (!mask_digest_.empty())
+        throw UsageError("--mask-digest: only a mask that is a tile has it; leave it out");
+      return;
     }
-    if (size_ != 0) settings.size = openvdb::Coord(size_);
+    const std::string digest = digestOf(dither_.mask);
+    if (!mask_digest_.empty() && mask_digest_ != digest)
+      throw DataError("--mask-digest: the digest of the mask is " + digest + ", not '" +
+                      mask_digest_ + "'; give the mask that was used, or leave the option out");
+    mask_digest_ = digest;
+  }
+
+  static std::string digestOf(const ThresholdMask& mask) {
+    constexpr std::size_t length = 16;
+    const openvdb::Coord size = mask.size();
+    const std::span<const float> values = mask.values();
+    Digest digest;
+    digest.update(size.data(), 3 * sizeof(openvdb::Int32));
+    digest.update(values.data(), values.size_bytes());
+    return hexText(digest.finish()).substr(0, length);
+  }
+
+  /// Out of the user's cache, or new.
+  [[nodiscard]] ThresholdMask madeMask() const {
+    VoidAndCluster settings = mask_ == MaskSource::paper ? paperMask() : defaultMask();
+    if (sigma_) settings.kernel.sigma = openvdb::Vec3d(*sigma_);
+    if (size_) settings.size = openvdb::Coord(*size_);
     settings.seed = static_cast<std::uint64_t>(seed_);
     const auto make = [&] {
       return maskOf(settings, [this](double fraction) { report().progress(fraction); });
@@ -189,15 +231,17 @@ class Dither : public Filter {
                     " on this lattice needs " + text(needed_mm));
   }
 
-  std::string mask_ = "preset";
-  std::string preset_ = "best";
-  std::string amplitude_ = "preset";
-  std::string at_ = "preset";
-  std::string guard_ = "preset";
+  Preset preset_ = Preset::best;
+  MaskSource mask_{};
+  std::string mask_file_;
+  std::optional<double> amplitude_;  ///< none: adapted
+  DitherAt at_{};
+  Guard guard_{};
   double spread_mm_ = 0.05;
-  double sigma_ = 0;
-  int size_ = 0;
+  std::optional<double> sigma_;
+  std::optional<int> size_;
   int seed_ = 1;
+  std::string mask_digest_;
   bool displaced_ = false;
 
   ShapeDither dither_;

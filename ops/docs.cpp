@@ -1,31 +1,37 @@
+#include <array>
 #include <filesystem>
 
 #include "io/file/staged_output.h"
 #include "vdbdither/engine/manual.h"
 #include "vdbdither/engine/tool.h"
-#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 
 namespace {
 
+enum class Kind { markdown, man, completion };
+constexpr std::array<Choice<Kind>, 3> kinds{
+    {{Kind::markdown, "markdown", "The pages of docs/operators"},
+     {Kind::man, "man", "Manual pages"},
+     {Kind::completion, "completion", "Completion for bash, zsh and fish"}}};
+
 /// Writes the manuals that are made from what operators and commands declare.
 class Docs : public Tool {
  public:
   void declare(Options& options) override {
-    options.positional("kind", kind_, "markdown, man or completion");
-    options.positional("folder", folder_, "Where the files go; those there are replaced");
+    options.positional("kind", kind_, kinds, "What to write");
+    options.positional("folder", folder_,
+                       "Folder for the files, which replace those of the same name");
   }
 
   void run() override {
-    if (kind_ == "markdown") {
-      write(markdownFiles());
-    } else if (kind_ == "man") {
-      write(manualFiles());
-    } else if (kind_ == "completion") {
-      write(completionFiles());
-    } else {
-      throw UsageError("kind: '" + kind_ + "' is none of markdown, man, completion");
+    switch (kind_) {
+      case Kind::markdown:
+        return write(markdownFiles());
+      case Kind::man:
+        return write(manualFiles());
+      case Kind::completion:
+        return write(completionFiles());
     }
   }
 
@@ -39,7 +45,7 @@ class Docs : public Tool {
     }
   }
 
-  std::string kind_;
+  Kind kind_ = Kind::markdown;
   std::string folder_;
 };
 

@@ -26,14 +26,15 @@ using openvdb::Vec3d;
 class Hollow : public Filter {
  public:
   void declare(Options& options) override {
-    options.length("thickness", thickness_mm_, "How thick the shell is, under the surface");
+    options.length("thickness", thickness_mm_, Range::above(0, 1000),
+                   "Thickness of the shell under the surface");
+    options.required();
     options.texts("drain", drains_given_, "X,Y,Z:DX,DY,DZ:DIAMETER",
-                  "A hole through the shell around a position, in mm, along a direction; reaches "
-                  "twice the thickness either way. May be given again");
+                  "A hole through the shell around a position in mm, along a direction, that "
+                  "reaches twice the thickness either way; may be given several times");
   }
 
   Schema plan(const Schema& in) override {
-    if (!(thickness_mm_ > 0)) throw UsageError("--thickness: give a length above zero");
     const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
     lattice_ = in.lattice;
     planBand(*surface);
@@ -93,7 +94,7 @@ class Hollow : public Filter {
     for (const char end : {',', ',', ':', ',', ',', ':', '\0'}) {
       if (!std::getline(stream, word, end)) break;
       try {
-        numbers[count] = parseLengthMm(word);
+        numbers[count] = parseLengthMm(word, {-1e6, 1e6});
       } catch (const UsageError&) {
         break;
       }

@@ -11,6 +11,7 @@
 #include "io/vdb/vdb.h"
 #include "ops/kernels/measure/grid_summary.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/engine/run_options.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/known_grids.h"
@@ -109,8 +110,9 @@ Takers takersOf(const GridBase& grid, const std::string& path, const std::string
 class Info : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", path_, "The .vdb to look into; nothing: what comes to it", false);
-    options.flag("json", json_, "Say it as JSON");
+    options.positional("file", path_,
+                       "The .vdb to describe in place of the volume that reaches this step", false);
+    json_.declare(options);
   }
 
   [[nodiscard]] std::string inputFile() const override { return standsAlone() ? "" : path_; }
@@ -145,7 +147,7 @@ class Info : public Sink {
       if (!isJob(contents.grids)) return tellGrids(contents.grids);
       takeAll(contents);
     }
-    report().print(json_ ? jsonText() : plainText());
+    report().print(json_.json ? jsonText() : plainText());
   }
 
  private:
@@ -188,7 +190,7 @@ class Info : public Sink {
       }
       json["grids"].push_back(std::move(entry));
     }
-    report().print(json_ ? json.dump() + "\n" : text.str());
+    report().print(json_.json ? json.dump() + "\n" : text.str());
   }
 
   /// Where the voxels of a grid lie.
@@ -351,7 +353,7 @@ class Info : public Sink {
   }
 
   std::string path_;
-  bool json_ = false;
+  JsonOption json_;
   Schema schema_;
   std::map<std::string, GridSummary> summaries_;
   int layers_ = 0;

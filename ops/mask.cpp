@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <mutex>
@@ -16,6 +17,20 @@ namespace {
 using openvdb::Coord;
 
 constexpr int greatest_size = 256;
+
+enum class Kind { void_and_cluster, white, bayer, gradient_noise };
+constexpr std::array<Choice<Kind>, 4> kinds{
+    {{Kind::void_and_cluster, "void-and-cluster", "Blue noise, by void and cluster"},
+     {Kind::white, "white", "White noise"},
+     {Kind::bayer, "bayer", "Ordered dither, after Bayer"},
+     {Kind::gradient_noise, "gradient-noise", "Perlin's gradient noise"}}};
+
+constexpr std::array<Choice<MaskKernel::Shape>, 3> kernels{
+    {{MaskKernel::Shape::peters, "peters",
+      "A Gaussian, filtered on the discrete Fourier transform"},
+     {MaskKernel::Shape::gauss, "gauss", "A sampled Gaussian"},
+     {MaskKernel::Shape::axis_mix, "axis-mix",
+      "A Gaussian in space and one in each lattice plane, mixed"}}};
 
 /// The ranks of a Bayer (ordered) mask whose edges are powers of two, x fastest: the bits of the
 /// exclusive or of the coordinates, the lowest first, decide most.
@@ -42,88 +57,71 @@ std::vector<std::uint32_t> bayerRanks(const Coord& size) {
 class Mask : public Source {
  public:
   void declare(Options& options) override {
-    options.triple("size", size_, "N", "Period of the tile along x, y, z, voxels, 1 to 256");
-    options.choice(
-        "kind", kind_, {"void-and-cluster", "white", "bayer", "gradient-noise"},
-        "How the ranks are ordered: blue noise, white noise, ordered dither, or Perlin's "
-        "noise");
-    options.choice("kernel", kernel_, {"peters", "gauss", "axis-mix"},
-                   "Void and cluster: the Gaussian filtered on the DFT, sampled, or mixed with its "
-                   "lattice planes");
-    options.triple("sigma", sigma_, "S",
-                   "Void and cluster: standard deviation of the Gaussian along x, y, z, voxels");
-    options.number("plane-sigma", plane_sigma_, 0.3, 16,
-                   "axis-mix: standard deviation in the lattice planes, voxels");
-    options.number("space-weight", space_weight_, 0, 1e6,
-                   "axis-mix: weight of the Gaussian in space");
-    options.integer("cell", cell_, 2, 128, "Gradient noise: edge of its cells, voxels");
-    options.integer("seed", seed_, 0, std::numeric_limits<int>::max(), "Seed of the random start");
+    options.triple("size", size_, "N|NX,NY,NZ", {1, greatest_size},
+                   "Period of the tile along x, y and z, in voxels");
+    options.choice("kind", kind_, kinds, "How the thresholds are ordered");
+    options.choice("kernel", kernel_, kernels, "Kernel of void-and-cluster");
+    options.triple("sigma", sigma_, "S|SX,SY,SZ", {0.3, 16},
+                   "Standard deviation of the Gaussian of void-and-cluster along x, y and z, in "
+                   "voxels");
+    options.number("plane-sigma", plane_sigma_, {0.3, 16},
+                   "Standard deviation in the lattice planes of axis-mix, in voxels");
+    options.number("space-weight", space_weight_, {0, 1e6},
+                   "Weight of the Gaussian in space of axis-mix");
+    options.integer("cell", cell_, {2, 128}, "Edge of the cells of gradient-noise, in voxels");
+    options.integer("seed", seed_, {0, std::numeric_limits<int>::max()},
+                    "Seed of the random start");
   }
 
   Schema plan() override {
     for (int axis = 0; axis < 3; ++axis) {
-      const double edge = size_[axis];
-      if (!(edge >= 1 && edge <= greatest_size && edge == std::floor(edge))) {
-        throw UsageError("--size: " + shortestText(edge) +
-                         " is no period; whole numbers from 1 to 256 are");
-      }
-      if (kind_ == "bayer" && !std::has_single_bit(static_cast<unsigned>(edge))) {
-        throw UsageError("--size: " + shortestText(edge) +
-                         " is no power of two, which --kind bayer needs");
-      }
-      if (kind_ == "gradient-noise" && static_cast<int>(edge) % cell_ != 0) {
-        throw UsageError("--size: " + shortestText(edge) + " is no multiple of --cell " +
-                         std::to_string(cell_));
-      }
-      if (!(sigma_[axis] >= 0.3 && sigma_[axis] <= 16)) {
-        throw UsageError("--sigma: " + shortestText(sigma_[axis]) +
-                         " is out of range; 0.3 to 16 are accepted");
-      }
+      const int edge = size_[axis];
+      if (kind_ == Kind::bayer && !std::has_single_bit(static_cast<unsigned>(edge)))
+        throw UsageError("--size: --kind bayer needs a power of two, not " + std::to_string(edge));
+      if (kind_ == Kind::gradient_noise && edge % cell_ != 0)
+        throw UsageError("--size: --kind gradient-noise needs a multiple of --cell " +
+                         std::to_string(cell_) + ", not " + std::to_string(edge));
     }
-    const Coord size = tileSize();
     Schema schema;
-    schema.lattice.box = openvdb::CoordBBox(Coord(0, 0, 0), size.offsetBy(-1));
+    schema.lattice.box = openvdb::CoordBBox(Coord(0, 0, 0), size_.offsetBy(-1));
     schema.grids[mask_grid] = emptyGrid();
     const auto leaves = [](int voxels) { return (voxels + leaf_layers - 1) / leaf_layers; };
-    schema.leaves_per_row = leaves(size.x()) * leaves(size.y());
-    schema.leaves = schema.surface_leaves = schema.leaves_per_row * leaves(size.z());
+    schema.leaves_per_row = leaves(size_.x()) * leaves(size_.y());
+    schema.leaves = schema.surface_leaves = schema.leaves_per_row * leaves(size_.z());
     return schema;
   }
 
   [[nodiscard]] double memoryBytes() const override {
-    const Coord size = tileSize();
-    const double ranks = 4.0 * size.x() * size.y() * size.z();
-    return kind_ == "void-and-cluster" ? 8 * ranks
-           : kind_ == "gradient-noise" ? 5 * ranks
-                                       : 2 * ranks;
+    const double ranks = 4.0 * voxels();
+    return kind_ == Kind::void_and_cluster ? 8 * ranks
+           : kind_ == Kind::gradient_noise ? 5 * ranks
+                                           : 2 * ranks;
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    const Coord size = tileSize();
-    const double voxels = static_cast<double>(size.x()) * size.y() * size.z();
-    if (kind_ == "void-and-cluster")
-      return Work{.seconds = voidAndClusterSeconds(settings()) + 2e-8 * voxels};
-    const double us_per_voxel = kind_ == "gradient-noise" ? 0.3 : 0.025;
-    return Work{.seconds = 1e-6 * us_per_voxel * voxels};
+    if (kind_ == Kind::void_and_cluster)
+      return Work{.seconds = voidAndClusterSeconds(settings()) + 2e-8 * voxels()};
+    const double us_per_voxel = kind_ == Kind::gradient_noise ? 0.3 : 0.025;
+    return Work{.seconds = 1e-6 * us_per_voxel * voxels()};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {
     std::call_once(made_, [&] { ranks_ = makeRanks(); });
     const openvdb::FloatGrid::Ptr grid = emptyGrid();
-    const ZRange layers = intersection(core, {0, tileSize().z()});
+    const ZRange layers = intersection(core, {0, size_.z()});
     if (!layers.empty()) addThresholds(ranks_, layers.begin, layers.end, *grid);
     return {{mask_grid, grid}};
   }
 
  private:
-  [[nodiscard]] Coord tileSize() const { return Coord::floor(size_); }
+  [[nodiscard]] double voxels() const {
+    return static_cast<double>(size_.x()) * size_.y() * size_.z();
+  }
 
   [[nodiscard]] VoidAndCluster settings() const {
     VoidAndCluster settings;
-    settings.size = tileSize();
-    settings.kernel.shape = kernel_ == "peters"  ? MaskKernel::Shape::peters
-                            : kernel_ == "gauss" ? MaskKernel::Shape::gauss
-                                                 : MaskKernel::Shape::axis_mix;
+    settings.size = size_;
+    settings.kernel.shape = kernel_;
     settings.kernel.sigma = sigma_;
     settings.kernel.plane_sigma = plane_sigma_;
     settings.kernel.space_weight = space_weight_;
@@ -132,24 +130,23 @@ class Mask : public Source {
   }
 
   [[nodiscard]] openvdb::FloatGrid::Ptr emptyGrid() const {
-    if (kind_ == "void-and-cluster") return emptyMask(settings());
-    openvdb::FloatGrid::Ptr grid = emptyMask(tileSize(), kind_);
-    if (kind_ == "gradient-noise") grid->insertMeta("mask:cell", openvdb::Int32Metadata(cell_));
-    if (kind_ != "bayer") grid->insertMeta("mask:seed", openvdb::Int32Metadata(seed_));
+    if (kind_ == Kind::void_and_cluster) return emptyMask(settings());
+    openvdb::FloatGrid::Ptr grid = emptyMask(size_, std::string(nameOf(kinds, kind_)));
+    if (kind_ == Kind::gradient_noise) grid->insertMeta("mask:cell", openvdb::Int32Metadata(cell_));
+    if (kind_ != Kind::bayer) grid->insertMeta("mask:seed", openvdb::Int32Metadata(seed_));
     return grid;
   }
 
   [[nodiscard]] std::vector<std::uint32_t> makeRanks() const {
-    const Coord size = tileSize();
-    if (kind_ == "bayer") return bayerRanks(size);
-    if (kind_ == "gradient-noise") return gradientNoiseRanks(size, cell_, seed_);
-    if (kind_ == "white") return randomPermutation(size.x() * size.y() * size.z(), seed_);
+    if (kind_ == Kind::bayer) return bayerRanks(size_);
+    if (kind_ == Kind::gradient_noise) return gradientNoiseRanks(size_, cell_, seed_);
+    if (kind_ == Kind::white) return randomPermutation(size_.x() * size_.y() * size_.z(), seed_);
     return voidAndCluster(settings(), [this](double fraction) { report().progress(fraction); });
   }
 
-  openvdb::Vec3d size_{128, 128, 128};
-  std::string kind_ = "void-and-cluster";
-  std::string kernel_ = "peters";
+  Coord size_{128, 128, 128};
+  Kind kind_ = Kind::void_and_cluster;
+  MaskKernel::Shape kernel_ = MaskKernel::Shape::peters;
   openvdb::Vec3d sigma_{1.1, 1.1, 1.1};
   double plane_sigma_ = 2.3;
   double space_weight_ = 2;

@@ -9,6 +9,7 @@
 #include "io/file/staged_output.h"
 #include "ops/kernels/mask/slice_spectrum.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/known_grids.h"
@@ -24,15 +25,17 @@ using openvdb::Coord;
 class MaskSpectrum : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", file_, "JSON file that will hold the spectra");
-    options.triple("pitch", pitch_mm_, "MM",
-                   "Pitch of the lattice that the mask is meant for; only its proportions count");
-    options.number("step", step_degrees_, 0.5, 45,
-                   "Step of the facets' polar and azimuthal angle for projections, degrees");
-    options.number("plane-step", plane_step_degrees_, 0.5, 45, "The same for voxel planes");
-    options.integer("levels", levels_, 0, 99,
-                    "Thresholded masks are looked at for this many evenly spaced thresholds");
-    options.flag("overwrite", overwrite_, "Replace a file that is there already");
+    options.positional("file", file_, "JSON file to write");
+    options.lengths("pitch", pitch_mm_, "DX,DY,DZ", Range::above(0, 1e6),
+                    "Pitch of the lattice that the mask is meant for; only its proportions count");
+    options.number(
+        "step", step_degrees_, {0.5, 45},
+        "Step of the polar and azimuthal angle of the facets for projections, in degrees");
+    options.number("plane-step", plane_step_degrees_, {0.5, 45},
+                   "The same for voxel planes, in degrees");
+    options.integer("levels", levels_, {0, 99},
+                    "Number of evenly spaced thresholds at which the thresholded mask is measured");
+    overwrite_.declare(options, "the file");
   }
 
   void plan(const Schema& in) override {
@@ -40,16 +43,12 @@ class MaskSpectrum : public Sink {
     box_ = in.lattice.box;
     if (box_.empty()) throw DataError("there is no mask to look at: the lattice has no voxels");
     for (int axis = 0; axis < 3; ++axis) {
-      if (!(pitch_mm_[axis] > 0)) {
-        throw UsageError("--pitch: " + shortestText(pitch_mm_[axis]) +
-                         " is no pitch; more than 0 mm is");
-      }
       if (box_.dim()[axis] > 256) {
         throw DataError("the mask is " + std::to_string(box_.dim()[axis]) +
                         " voxels long; tiles of up to 256 are looked at");
       }
     }
-    StagedOutput::check(file_, StagedOutput::Kind::file, overwrite_);
+    StagedOutput::check(file_, StagedOutput::Kind::file, overwrite_.overwrite);
     values_.assign(box_.volume(), 0.0f);
   }
 
@@ -168,7 +167,7 @@ class MaskSpectrum : public Sink {
   double step_degrees_ = 1;
   double plane_step_degrees_ = 5;
   int levels_ = 9;
-  bool overwrite_ = false;
+  OverwriteOption overwrite_;
   openvdb::CoordBBox box_;
   openvdb::MetaMap::Ptr metadata_;
   std::vector<float> values_;

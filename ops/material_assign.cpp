@@ -69,16 +69,17 @@ Int32Tree::Ptr onesWhereActive(const BoolTree& solid) {
 class MaterialAssign : public Filter {
  public:
   void declare(Options& options) override {
-    options.text("material", material_, "NAME",
-                 "One material for all: a name of the printer's, or NAME=#rrggbb. The printer's "
-                 "first, else white, unless given");
+    options.text(
+        "material", material_, "NAME",
+        "One material for all voxels: a name of the printer's profile, or NAME=#rrggbb; by "
+        "default the first of the profile, or else white");
     options.text("parts", parts_, "NAME,...",
                  "A material for each part, in the order of the meshes");
-    options.text("shell", shell_, "MM:NAME,...",
+    options.text("shell", shell_, "LENGTH:NAME,...",
                  "Layers under the printed surface from the outside in, each with its thickness, "
-                 "as in 0.2mm:white,0.5mm:black. "
-                 "Depth is the distance from a voxel's centre to that of the nearest empty voxel");
-    options.text("core", core_, "NAME", "What lies beneath the shell");
+                 "such as 0.2mm:white,0.5mm:black. The depth of a voxel is the distance from its "
+                 "centre to that of the nearest empty voxel");
+    options.text("core", core_, "NAME", "Material beneath the shell");
   }
 
   Schema plan(const Schema& in) override {
@@ -146,20 +147,23 @@ class MaterialAssign : public Filter {
           throw UsageError("--shell: '" + layer +
                            "' must be a thickness and a material, as in 0.5mm:white");
         }
-        const double thickness_mm = parseLengthMm(layer.substr(0, colon));
-        if (!(thickness_mm > 0))
-          throw UsageError("--shell: '" + layer + "' must be thicker than zero");
+        const double thickness_mm = thicknessMm(layer, colon);
         depth_mm += thickness_mm;
         add("--shell", layer.substr(colon + 1), known);
         bands_.push_back({depth_mm, static_cast<std::int32_t>(table_.size())});
       }
       add("--core", core_, known);
     } else {
-      add("--material",
-          !material_.empty() ? material_
-          : known.empty()    ? "white"
-                             : known.front().name,
-          known);
+      if (material_.empty()) material_ = known.empty() ? "white" : known.front().name;
+      add("--material", material_, known);
+    }
+  }
+
+  static double thicknessMm(const std::string& layer, std::size_t colon) {
+    try {
+      return parseLengthMm(layer.substr(0, colon), Range::above(0, 1000));
+    } catch (const UsageError& error) {
+      throw UsageError(std::string("--shell: ") + error.what());
     }
   }
 

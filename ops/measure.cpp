@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file/staged_output.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/mesh/mesh_writer.h"
 #include "ops/kernels/contour/grid_surface.h"
@@ -22,6 +23,7 @@
 #include "ops/kernels/mesh/taubin.h"
 #include "ops/kernels/picture/diverging_colours.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
 
@@ -30,6 +32,11 @@ namespace vdbdither {
 namespace {
 
 using nlohmann::ordered_json;
+
+/// The endings of the mesh files that hold the error of each vertex.
+std::string colouredEndings() {
+  return meshEndings([](const MeshFormat& format) { return format.holds_extras; });
+}
 
 ordered_json json(const ErrorStatistics& statistics) {
   ordered_json result{{"weight", statistics.weight},         {"bias_mm", statistics.bias_mm},
@@ -130,59 +137,47 @@ std::string plainText(const ordered_json& all) {
 class Measure : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("mesh", file_,
-                       "A mesh to measure in place of what comes down a chain: STL, OBJ or PLY",
-                       false);
-    options.text("reference", reference_file_, "FILE", "The mesh that it should be");
-    options.choice("unit", unit_, {"mm", "cm", "m", "in", "um"},
-                   "What the reference's numbers mean");
-    options.number("scale", scale_, 1e-6, 1e6, "Scales the reference about the origin");
-    options.length("fit", placement_.fit_mm,
-                   "Scales the reference until its longest axis has this length");
-    options.triple("rotate", placement_.rotate_degrees, "X,Y,Z",
-                   "Turns the reference about x, then y, then z, in degrees");
-    options.flag("place", placement_.on_bed,
-                 "Puts the reference on the bed: its bounding box begins at the origin");
-    options.text("grid", grid_, "NAME",
-                 "Whose surface comes down the chain: of solid its voxels, of printed, displaced "
-                 "and surface a level; auto takes the furthest down the chain");
-    options.choice("smooth", smooth_, {"none", "taubin"},
-                   "taubin: Taubin's smoothing before, lambda 0.5 and mu -0.53");
-    options.integer("iterations", taubin_.iterations, 1, 100000, "How often it smooths");
-    options.length("spacing", spacing_mm_,
-                   "Triangles with longer sides are measured at points in between too");
-    options.length("cutoff", rules_.cutoff_mm,
-                   "The shortest wavelength that counts for the band-limited roughness");
-    options.length("margin", rules_.margin_mm,
-                   "Roughness leaves out what is nearer than this to an edge of a facet");
-    options.text("report", report_file_, "FILE.json", "Writes all figures to a file");
-    options.text("map", map_file_, "FILE.ply", "Writes the mesh, coloured by its error");
-    options.length("map-range", map_range_mm_,
-                   "The error of the map's last colours; 0 takes the 99th percentile");
-    options.flag("json", json_, "Prints all figures, as JSON");
-    options.flag("overwrite", overwrite_, "Replace files that are there");
+    options.positional(
+        "mesh", file_,
+        "Mesh to measure in place of the volume that reaches this step: " + meshFormatNames(),
+        false);
+    options.file("reference", reference_file_, "FILE", "Mesh that the surface should be");
+    options.required();
+    placement_.declare(options, "the reference");
+    surface_grid_.declare(options);
+    smoothing_.declare(options);
+    options.length("spacing", spacing_mm_, {1e-3, 1000},
+                   "Maximum distance between the points at which a triangle is measured");
+    options.length("cutoff", rules_.cutoff_mm, {1e-3, 1e4},
+                   "Minimum wavelength that counts for the band-limited roughness");
+    options.length("margin", rules_.margin_mm, {0, 1000},
+                   "Distance from the edges of a facet within which its roughness is not measured");
+    options.file("report", report_file_, "FILE.json", "Writes all figures to a file");
+    options.file("map", map_file_, "FILE",
+                 "Writes the mesh, coloured by its error, into a " + colouredEndings() + " file");
+    options.length("map-range", map_range_mm_, Range::above(0, 1000),
+                   "Error that the last colours of the map stand for",
+                   {"auto", "The 99th percentile of the error"});
+    json_.declare(options);
+    overwrite_.declare(options, "each file");
   }
 
   [[nodiscard]] bool standsAlone() const override { return !file_.empty(); }
 
   void plan(const Schema& in) override {
-    if (reference_file_.empty())
-      throw UsageError("--reference is missing: name the mesh that the surface should be");
-    for (const auto& [name, value] :
-         {std::pair("--spacing", spacing_mm_), std::pair("--cutoff", rules_.cutoff_mm)}) {
-      if (!(value > 0)) throw UsageError(std::string(name) + ": 0 mm is no length to look at");
-    }
     if (!report_file_.empty())
-      StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_);
+      StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_.overwrite);
     if (!map_file_.empty()) {
-      if (!map_file_.ends_with(".ply"))
-        throw UsageError("--map: '" + map_file_ + "' is no .ply, which alone holds colours");
-      MeshWriter::check(map_file_, overwrite_);
+      const MeshFormat* format = meshFormatNamedBy(map_file_);
+      if (format == nullptr || !format->holds_extras)
+        throw UsageError("--map: '" + map_file_ + "' cannot hold colours; name a " +
+                         colouredEndings() + " file");
+      MeshWriter::check(map_file_, overwrite_.overwrite);
     }
     if (!standsAlone()) {
       std::vector<std::string> there;
       for (const auto& [name, grid] : in.grids) there.push_back(name);
-      name_ = chosenSurfaceGrid(there, grid_);
+      name_ = chosenSurfaceGrid(there, surface_grid_.grid);
       lattice_ = in.lattice;
       surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
       components_.emplace(surface_->frame());
@@ -199,7 +194,7 @@ class Measure : public Sink {
         std::sqrt(pitch.lengthSqr() - std::pow(std::min({pitch.x(), pitch.y(), pitch.z()}), 2));
     const double cuts = side_mm > spacing_mm_ ? std::ceil(side_mm / spacing_mm_) : 0;
     const double points = 1 + 2 * cuts * cuts;  // for a vertex
-    const double smoothing = smooth_ == "none" ? 0 : taubin_.usPerVertex();
+    const double smoothing = smooths() ? taubin().usPerVertex() : 0;
     return Work{.us_per_leaf = GridSurface::vertices_per_leaf * (0.3 + 1.3 * points + smoothing),
                 .seconds = 2e-6 * static_cast<double>(reference_->mesh().triangles.size())};
   }
@@ -219,13 +214,13 @@ class Measure : public Sink {
     const auto warn = [this](const std::string& text) { report().warn(text); };
     if (standsAlone()) {
       mesh_ = readMesh(file_, warn);
-      if (smooth_ != "none") checkClosed();
+      if (smooths()) checkClosed();
     } else {
       take(surface_->finish());
     }
     if (mesh_.triangles.empty())
       throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
-    if (smooth_ != "none") smooth(mesh_, taubin_, progress);
+    if (smooths()) smooth(mesh_, taubin(), progress);
     const SurfaceErrors errors = surfaceErrors(mesh_, *reference_, spacing_mm_, progress);
     const ordered_json all = figures(errors);
     for (const char* name :
@@ -241,7 +236,7 @@ class Measure : public Sink {
     }
     if (!map_file_.empty()) writeMap(errors, all["map_range_mm"].get<double>());
     if (staged) staged->commit();
-    if (json_) {
+    if (json_.json) {
       report().print(all.dump(1) + "\n");
     } else if (report_file_.empty()) {
       report().print(plainText(all));
@@ -249,10 +244,13 @@ class Measure : public Sink {
   }
 
  private:
+  [[nodiscard]] bool smooths() const { return smoothing_.smoothing != Smoothing::none; }
+  [[nodiscard]] Taubin taubin() const { return {.iterations = smoothing_.iterations}; }
+
   void readReference() {
     Mesh mesh = readMesh(reference_file_, [this](const std::string& text) { report().warn(text); });
-    placement_.factor = unitMm(unit_) * scale_;
-    place(mesh, placement_);
+    const MeshPlacementOptions& given = placement_;
+    place(mesh, {given.rotate_degrees, given.mmPerUnit(), given.fit_mm.value_or(0), given.on_bed});
     MeshRepairs repairs;
     mesh = repaired(std::move(mesh), repairs);
     if (mesh.triangles.empty())
@@ -283,7 +281,7 @@ class Measure : public Sink {
     ordered_json all;
     all["surface"] = json(mesh_);
     all["surface"]["of"] = standsAlone() ? file_ : "grid " + name_;
-    all["surface"]["smoothing"] = smooth_ == "none" ? 0 : taubin_.iterations;
+    all["surface"]["smoothing"] = smooths() ? smoothing_.iterations : 0;
     all["reference"] = json(reference_->mesh());
     all["reference"]["of"] = reference_file_;
     const double volume = all["surface"]["volume_mm3"];
@@ -306,7 +304,7 @@ class Measure : public Sink {
       all["components"] = json(counts.components);
       all["cavities"] = json(counts.cavities);
     }
-    all["map_range_mm"] = map_range_mm_ > 0 ? map_range_mm_ : by_area.percentile(99);
+    all["map_range_mm"] = map_range_mm_.value_or(by_area.percentile(99));
     return all;
   }
 
@@ -328,19 +326,16 @@ class Measure : public Sink {
 
   std::string file_;
   std::string reference_file_;
-  std::string unit_ = "mm";
-  double scale_ = 1;
-  MeshPlacement placement_;
-  std::string grid_ = "auto";
-  std::string smooth_ = "none";
-  Taubin taubin_;
+  MeshPlacementOptions placement_;
+  SurfaceGridOption surface_grid_;
+  SmoothingOptions smoothing_;
   double spacing_mm_ = 0.1;
   RoughnessRules rules_;
   std::string report_file_;
   std::string map_file_;
-  double map_range_mm_ = 0;
-  bool json_ = false;
-  bool overwrite_ = false;
+  std::optional<double> map_range_mm_;
+  JsonOption json_;
+  OverwriteOption overwrite_;
 
   std::string name_;
   Lattice lattice_;

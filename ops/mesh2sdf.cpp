@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/profile/printer_profile.h"
 #include "io/profile/target_lattice.h"
@@ -12,6 +13,7 @@
 #include "ops/kernels/mesh/mesh_repair.h"
 #include "ops/kernels/mesh/winding_surface.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
@@ -28,35 +30,29 @@ class MeshToSdf : public Source {
   void declare(Options& options) override {
     options.positionals(
         "mesh", paths_,
-        "Mesh files: STL, OBJ or PLY; several are printed as one, and 'part' tells them apart");
-    options.text("printer", printer_, "NAME|FILE.json", "The printer whose lattice to use");
-    options.text("pitch", pitch_, "DX,DY,DZ", "The lattice's pitch, in place of a printer's");
-    options.choice("unit", unit_, {"mm", "cm", "m", "in", "um"}, "What the mesh's numbers mean");
-    options.number("scale", scale_, 1e-6, 1e6, "Scales the mesh about the origin");
-    options.length("fit", fit_mm_, "Scales the mesh until its longest axis has this length");
-    options.triple("rotate", rotate_, "X,Y,Z",
-                   "Turns the mesh about x, then y, then z, in degrees");
-    options.flag("place", place_,
-                 "Puts the mesh on the bed: its bounding box begins at the origin");
-    options.integer("refine-y", refine_y_, 1, 16, "Voxels in place of one along y");
-    options.text(
-        "band", band_text_, "N|MM",
-        "How far from the surface distances are kept: in voxel diameters along the normal, or "
-        "with a unit as a length");
+        "Mesh files: " + meshFormatNames() +
+            ". Several are printed as one part, and the grid 'part' tells them apart");
+    target_.declare(options);
+    placement_.declare(options, "the mesh");
+    options.integer("refine-y", refine_y_, {1, 16}, "Voxels in place of one along y");
+    options.parsed(
+        "band", "N|LENGTH", [this](const std::string& text) { band_ = bandFrom(text); },
+        [this] { return bandText(); },
+        "Distance from the surface up to which distances are kept: a number of voxel diameters "
+        "along the normal, or a length with its unit");
     options.flag("strict", strict_, "Refuses a mesh that needs repair");
-    options.flag("normals", extras_.normals, "Adds the grid 'N', exact unit outward normals");
+    options.flag("normals", extras_.normals, "Adds the grid 'N' of exact unit outward normals");
     options.flag("closest", extras_.closest,
-                 "Adds the grid 'closest', the index of the nearest triangle");
+                 "Adds the grid 'closest' with the index of the nearest triangle");
   }
 
   Schema plan() override {
     Schema schema;
-    const Vec3d pitch_mm = targetPitchMm(printer_, pitch_, schema);
-    band_ = bandFrom(band_text_);
+    const Vec3d pitch_mm = targetPitchMm(target_, schema);
     held_band_mm_ = band_.leastMm(pitch_mm);
-    if (fit_mm_ < 0) throw UsageError("--fit: " + shortestText(fit_mm_) + " mm is below zero");
     Mesh mesh = readMeshes();
-    place(mesh, {rotate_, unitMm(unit_) * scale_, fit_mm_, place_});
+    place(mesh, {placement_.rotate_degrees, placement_.mmPerUnit(), placement_.fit_mm.value_or(0),
+                 placement_.on_bed});
     questionSize(mesh, schema);
     const std::vector<Mesh> parts = closed(mesh);  // which a guess may make larger
     schema.lattice = latticeOfMesh(mesh, pitch_mm);
@@ -99,10 +95,15 @@ class MeshToSdf : public Source {
   };
 
   static Band bandFrom(const std::string& text) {
-    const bool diameters = text.find_first_not_of("0123456789.") == std::string::npos;
-    const double size = parseLengthMm(text);
-    if (!(size > 0)) throw UsageError("--band: '" + text + "' is not above zero");
-    return diameters ? Band{size, 0} : Band{0, size};
+    constexpr Range diameters = Range::above(0, 1000);
+    constexpr Range lengths_mm = Range::above(0, 1000);
+    if (text.find_first_not_of("0123456789.") == std::string::npos)
+      return {parseNumber(text, diameters, "a number " + diameters.text() + ", or a length"), 0};
+    return {0, parseLengthMm(text, lengths_mm)};
+  }
+
+  [[nodiscard]] std::string bandText() const {
+    return band_.mm > 0 ? shortestText(band_.mm) + "mm" : shortestText(band_.diameters);
   }
 
   /// What of the closed mesh is no surface, with what was repaired told or refused.
@@ -278,8 +279,8 @@ class MeshToSdf : public Source {
     constexpr double hand_mm = 100;
     std::string_view likelier;
     double best_mm = 0;
-    for (const auto& [name, factor] : units_mm) {
-      const double mm = longest_mm / unitMm(unit_) * factor;
+    for (const auto& [unit, name, meaning] : length_units) {
+      const double mm = longest_mm / mmOf(placement_.unit) * mmOf(unit);
       const bool nearer =
           best_mm == 0 || std::abs(std::log(mm / hand_mm)) < std::abs(std::log(best_mm / hand_mm));
       if ((mm < longest_mm) == (longest_mm > hand_mm) && mm != longest_mm && nearer) {
@@ -287,7 +288,7 @@ class MeshToSdf : public Source {
         best_mm = mm;
       }
     }
-    if (likelier.empty() || fit_mm_ > 0) return "is that meant?";
+    if (likelier.empty() || placement_.fit_mm) return "is that meant?";
     const std::string unit(likelier);
     return "are the file's numbers " + unit + "? --unit " + unit + " makes its longest side " +
            shortestText(std::round(best_mm * 100) / 100) + " mm";
@@ -351,16 +352,10 @@ class MeshToSdf : public Source {
   }
 
   std::vector<std::string> paths_;
-  std::string printer_;
-  std::string pitch_;
-  std::string unit_ = "mm";
-  double scale_ = 1;
-  double fit_mm_ = 0;
-  Vec3d rotate_{0, 0, 0};
-  bool place_ = false;
+  LatticeOptions target_;
+  MeshPlacementOptions placement_;
   bool strict_ = false;
   int refine_y_ = 1;
-  std::string band_text_ = "1";
   DistanceExtras extras_;
 
   Band band_;

@@ -3,10 +3,12 @@
 #include <string>
 #include <vector>
 
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_writer.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/mesh/taubin.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
 
@@ -17,40 +19,32 @@ namespace {
 class MeshExport : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", file_, "The .stl, .obj or .ply to write");
-    options.text("grid", grid_, "NAME",
-                 "Whose surface: of solid its voxels, of surface and displaced a level of the "
-                 "distance, of printed a level of the occupancy; auto takes the furthest down the "
-                 "chain");
-    options.text("level", level_, "MM",
-                 "Another level than 0 of a distance, in mm, or than 0.5 of an occupancy");
-    options.choice(
-        "smooth", smooth_, {"none", "taubin"},
-        "taubin: Taubin's smoothing, lambda 0.5 and mu -0.53, which holds the whole mesh");
-    options.integer("iterations", taubin_.iterations, 1, 100000, "How often it smooths");
-    options.flag("overwrite", overwrite_, "Replace the file if it is there");
+    options.positional("file", file_, "Mesh to write: " + meshEndings());
+    surface_grid_.declare(options);
+    options.length("level", level_mm_, {-1000, 1000},
+                   "Level of the surface, in place of 0 in a distance (mm) or 0.5 in a share of "
+                   "material");
+    smoothing_.declare(options);
+    overwrite_.declare(options, "the file");
   }
 
   void plan(const Schema& in) override {
     std::vector<std::string> there;
     for (const auto& [name, grid] : in.grids) there.push_back(name);
-    name_ = chosenSurfaceGrid(there, grid_);
-    std::optional<double> level;
-    if (!level_.empty()) level = parseLengthMm(level_);
-    surface_.emplace(in.lattice, *in.grids.at(name_), level);
-    MeshWriter::check(file_, overwrite_);
+    name_ = chosenSurfaceGrid(there, surface_grid_.grid);
+    surface_.emplace(in.lattice, *in.grids.at(name_), level_mm_);
+    MeshWriter::check(file_, overwrite_.overwrite);
     leaves_ = in.surface_leaves;
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    const double writing = file_.ends_with(".obj") ? 0.55 : 0.2;
-    const double smoothing = smooth_ == "none" ? 0 : taubin_.usPerVertex();
+    const double writing = meshFormatNamedBy(file_)->us_per_vertex;
+    const double smoothing = smooths() ? taubin().usPerVertex() : 0;
     return Work{.us_per_leaf = GridSurface::vertices_per_leaf * (0.1 + writing + smoothing)};
   }
 
   [[nodiscard]] OutputEstimate output() const override {
-    // Two triangles for a vertex: 50 bytes each, or 13 and the vertex 12, or lines of text.
-    const double per_vertex = file_.ends_with(".stl") ? 100 : file_.ends_with(".ply") ? 38 : 74;
+    const double per_vertex = meshFormatNamedBy(file_)->bytes_per_vertex;
     return {file_, leaves_ * GridSurface::vertices_per_leaf * per_vertex};
   }
 
@@ -58,14 +52,14 @@ class MeshExport : public Sink {
     return std::vector<std::string>{name_};
   }
 
-  [[nodiscard]] bool isBarrier() const override { return smooth_ != "none"; }
+  [[nodiscard]] bool isBarrier() const override { return smooths(); }
 
   void write(const Slab& in) override { take(surface_->add(in.grids.at(name_), in.core)); }
 
   void finish() override {
     take(surface_->finish());
-    if (smooth_ != "none") {
-      smooth(mesh_, taubin_, [this](double fraction) { report().progress(fraction); });
+    if (smooths()) {
+      smooth(mesh_, taubin(), [this](double fraction) { report().progress(fraction); });
       begin();
       writer_->add(mesh_.vertices, mesh_.triangles, 0);
     }
@@ -78,12 +72,15 @@ class MeshExport : public Sink {
   }
 
  private:
+  [[nodiscard]] bool smooths() const { return smoothing_.smoothing != Smoothing::none; }
+  [[nodiscard]] Taubin taubin() const { return {.iterations = smoothing_.iterations}; }
+
   void begin() {
     if (!writer_) writer_ = std::make_unique<MeshWriter>(file_);
   }
 
   void take(SurfacePiece piece) {
-    if (smooth_ == "none") {
+    if (!smooths()) {
       begin();
       writer_->add(piece.vertices, piece.triangles, piece.open_from);
       return;
@@ -93,11 +90,10 @@ class MeshExport : public Sink {
   }
 
   std::string file_;
-  std::string grid_ = "auto";
-  std::string level_;
-  std::string smooth_ = "none";
-  Taubin taubin_;
-  bool overwrite_ = false;
+  SurfaceGridOption surface_grid_;
+  std::optional<double> level_mm_;
+  SmoothingOptions smoothing_;
+  OverwriteOption overwrite_;
 
   std::string name_;
   double leaves_ = 0;
@@ -110,7 +106,7 @@ class MeshExport : public Sink {
 
 extern const OperatorInfo mesh_export;
 const OperatorInfo mesh_export{
-    "mesh-export", "The surface of a grid as a closed triangle mesh: STL, OBJ or PLY",
+    "mesh-export", "The surface of a grid as a closed triangle mesh",
     "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! mesh-export printed.stl",
     []() -> std::unique_ptr<Operator> { return std::make_unique<MeshExport>(); }};
 

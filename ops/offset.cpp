@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "io/image/grey_image.h"
@@ -18,43 +20,52 @@ namespace {
 
 using openvdb::FloatGrid;
 
+enum class Axis { x, y, z };
+constexpr std::array<Choice<Axis>, 3> axes{{{Axis::x, "x", "The columns of the map lie along z"},
+                                            {Axis::y, "y", "The columns of the map lie along z"},
+                                            {Axis::z, "z", "The columns of the map lie along y"}}};
+
+constexpr std::array<Choice<SurfaceOffset::At>, 2> places{
+    {{SurfaceOffset::At::closest, "closest", "At the closest surface voxel"},
+     {SurfaceOffset::At::foot, "foot",
+      "At the closest point of the surface; faster where distances are deep"}}};
+
 /// `surface` moved along its normal.
 class Offset : public Filter {
  public:
   void declare(Options& options) override {
-    options.length("by", by_mm_, "Offset everywhere; above zero the part grows, below it shrinks");
-    options.text("map", map_, "FILE.png|exr",
-                 "Adds a grey image of heights, projected along an axis and repeated: PNG as 0 to "
-                 "1, EXR as its numbers are");
-    options.length("height", height_mm_, "What 1 in the map stands for");
-    options.choice("along", along_, {"x", "y", "z"},
-                   "The axis along which the map is projected: it lies in the plane of the other "
-                   "two, its columns along the later one");
-    options.length("pixel", pixel_mm_,
-                   "Edge of the map's pixels, its lower left corner in the origin; unless given "
-                   "its width covers the part's box, once");
+    options.length("by", by_mm_, {-1000, 1000},
+                   "Offset everywhere: above zero the part grows, below it shrinks");
+    options.file(
+        "map", map_, "FILE.png|FILE.exr",
+        "Adds a grey image of heights, projected along an axis and repeated: the values of "
+        "a PNG are from 0 to 1, those of an EXR are taken as they are");
+    options.length("height", height_mm_, {-1000, 1000}, "Height of the value 1 of the map");
+    options.choice("along", along_, axes, "Axis along which the map is projected");
+    options.length("pixel", pixel_mm_, Range::above(0, 1e6),
+                   "Edge of the pixels of the map, whose lower left corner is then the origin; by "
+                   "default its width covers the box of the part once");
     options.text("grid", grid_, "NAME", "Adds the values of this grid of the chain, in mm");
-    options.length("most", most_mm_, "No value of --grid lies farther from zero");
-    options.choice("at", at_, {"closest", "foot"},
-                   "Where map and grid are read: at the closest surface voxel or at the foot "
-                   "point; this is faster where distances are deep");
+    options.length("most", most_mm_, Range::above(0, 1000),
+                   "Maximum distance of the values of --grid from zero");
+    options.choice("at", at_, places, "Where map and grid are read");
   }
 
   Schema plan(const Schema& in) override {
     const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
-    if (by_mm_ == 0 && map_.empty() && grid_.empty())
+    if (by_mm_.value_or(0) == 0 && map_.empty() && grid_.empty())
       throw UsageError("give an offset: --by, --map or --grid");
-    if (height_mm_ == 0 && !map_.empty()) throw UsageError("--map needs --height, in mm");
-    if ((most_mm_ > 0) == grid_.empty())
+    if (height_mm_.value_or(0) == 0 && !map_.empty())
+      throw UsageError("--map needs --height, which must not be 0 mm");
+    if (most_mm_.has_value() == grid_.empty())
       throw UsageError("--grid and --most go together; give both");
-    if (pixel_mm_ < 0) throw UsageError("--pixel: is below zero");
 
     offset_ = SurfaceOffset();
     offset_.lattice = in.lattice;
-    offset_.constant_mm = by_mm_;
-    offset_.at = at_ == "foot" ? SurfaceOffset::At::foot : SurfaceOffset::At::closest;
+    offset_.constant_mm = by_mm_.value_or(0);
+    offset_.at = at_;
     offset_.from_grid = !grid_.empty();
-    offset_.grid_limit_mm = most_mm_;
+    offset_.grid_limit_mm = most_mm_.value_or(0);
     offset_.held_mm = heldBandMm(*surface);
     if (!map_.empty()) offset_.map = heightMap(in.lattice);
     if (!grid_.empty()) findGrid<FloatGrid>(in.grids, grid_);
@@ -84,12 +95,12 @@ class Offset : public Filter {
   [[nodiscard]] HeightMap heightMap(const Lattice& lattice) const {
     try {
       GreyImage image = readGreyImage(map_);
-      for (float& value : image.values) value = static_cast<float>(double{value} * height_mm_);
-      const int axis = along_ == "x" ? 0 : along_ == "y" ? 1 : 2;
+      for (float& value : image.values) value = static_cast<float>(double{value} * *height_mm_);
+      const int axis = static_cast<int>(along_);
       const int across = axis == 0 ? 1 : 0;
       const int up = axis == 2 ? 1 : 2;
-      if (pixel_mm_ > 0)
-        return {std::move(image.values), image.width, image.height, axis, pixel_mm_, {0, 0}};
+      if (pixel_mm_)
+        return {std::move(image.values), image.width, image.height, axis, *pixel_mm_, {0, 0}};
       const openvdb::Vec3d corner = lattice.position(lattice.box.min()) - 0.5 * lattice.pitch_mm;
       const double width_mm = lattice.box.dim()[across] * lattice.pitch_mm[across];
       return {std::move(image.values),     image.width, image.height, axis, width_mm / image.width,
@@ -116,12 +127,12 @@ class Offset : public Filter {
 
   std::string map_;
   std::string grid_;
-  std::string along_ = "z";
-  std::string at_ = "closest";
-  double by_mm_ = 0;
-  double height_mm_ = 0;
-  double pixel_mm_ = 0;
-  double most_mm_ = 0;
+  Axis along_ = Axis::z;
+  SurfaceOffset::At at_ = SurfaceOffset::At::closest;
+  std::optional<double> by_mm_;
+  std::optional<double> height_mm_;
+  std::optional<double> pixel_mm_;
+  std::optional<double> most_mm_;
 
   SurfaceOffset offset_;
 };

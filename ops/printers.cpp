@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
 
@@ -6,6 +7,7 @@
 
 #include "io/file/standard_streams.h"
 #include "io/profile/printer_profile.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/engine/tool.h"
 #include "vdbdither/model/errors.h"
 
@@ -14,6 +16,12 @@ namespace vdbdither {
 namespace {
 
 using nlohmann::ordered_json;
+
+enum class Action { list, show, check };
+constexpr std::array<Choice<Action>, 3> actions{
+    {{Action::list, "list", "Lists the installed printers"},
+     {Action::show, "show", "Describes a printer"},
+     {Action::check, "check", "Lists the problems of a profile"}}};
 
 std::string lengthsText(const openvdb::Vec3d& mm) {
   // To the nanometre.
@@ -25,21 +33,21 @@ std::string lengthsText(const openvdb::Vec3d& mm) {
 class Printers : public Tool {
  public:
   void declare(Options& options) override {
-    options.positional("action", action_, "list (as without), show or check", false);
-    options.positional("printer", printer_, "For show and check: a name, or a profile file (.json)",
-                       false);
-    options.flag("json", as_json_, "Say it as JSON");
+    options.positional("action", action_, actions, "What to do", false);
+    options.positional("printer", printer_,
+                       "Name of a printer, or a profile file (.json), for show and check", false);
+    json_.declare(options);
   }
 
   void run() override {
-    if (action_.empty() || action_ == "list") {
-      if (!printer_.empty()) throw UsageError("unexpected argument '" + printer_ + "'; see --help");
+    if (action_ == Action::list) {
+      if (!printer_.empty())
+        throw UsageError("'" + printer_ + "' is not expected; printers show " + printer_ +
+                         " describes it");
       return print(list());
     }
-    if (action_ != "show" && action_ != "check")
-      throw UsageError("action: '" + action_ + "' is none of list, show, check");
-    if (printer_.empty()) throw UsageError("no printer is given; see --help");
-    print(action_ == "show" ? show(readPrinterProfile(printer_)) : check());
+    if (printer_.empty()) throw UsageError("'printer' is missing; see --help");
+    print(action_ == Action::show ? show(readPrinterProfile(printer_)) : check());
   }
 
  private:
@@ -54,11 +62,11 @@ class Printers : public Tool {
       text << name << std::string(std::max<std::size_t>(24, name.size() + 1) - name.size(), ' ')
            << lengthsText(profile.pitch_mm) << "  " << profile.title << "\n";
     }
-    return as_json_ ? json.dump() + "\n" : text.str();
+    return json_.json ? json.dump() + "\n" : text.str();
   }
 
   [[nodiscard]] std::string show(const PrinterProfile& profile) const {
-    if (as_json_) return toJson(profile) + "\n";
+    if (json_.json) return toJson(profile) + "\n";
     std::ostringstream text;
     text << "name      " << profile.name << "\ntitle     " << profile.title << "\npitch     "
          << lengthsText(profile.pitch_mm) << "\n";
@@ -78,7 +86,7 @@ class Printers : public Tool {
 
   [[nodiscard]] std::string check() const {
     const std::vector<std::string> problems = printerProfileProblems(printer_);
-    if (as_json_) {
+    if (json_.json) {
       print(ordered_json{{"profile", printer_}, {"problems", problems}}.dump() + "\n");
     } else {
       for (const std::string& problem : problems) print(problem + "\n");
@@ -87,12 +95,12 @@ class Printers : public Tool {
       throw DataError("'" + printer_ + "' has " + std::to_string(problems.size()) +
                       (problems.size() == 1 ? " problem" : " problems"));
     }
-    return as_json_ ? "" : "'" + printer_ + "' is a proper profile\n";
+    return json_.json ? "" : "'" + printer_ + "' is a proper profile\n";
   }
 
-  std::string action_;
+  Action action_ = Action::list;
   std::string printer_;
-  bool as_json_ = false;
+  JsonOption json_;
 };
 
 }  // namespace

@@ -1,8 +1,8 @@
 #include <unistd.h>
 
 #include "io/vdb/slab_reader.h"
-#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 
@@ -15,8 +15,8 @@ namespace {
 class ReadOperator : public Source {
  public:
   void declare(Options& options) override {
-    options.positional("file", path_, "The .vdb to read; - or nothing is standard input", false);
-    options.text("grids", names_, "NAME,NAME", "Only these grids");
+    options.positional("file", path_, "The .vdb to read; standard input if missing or -", false);
+    grids_.declare(options);
   }
 
   Schema plan() override {
@@ -25,8 +25,7 @@ class ReadOperator : public Source {
       throw UsageError(
           "nothing is piped in; name a source first (mesh2sdf part.stl), or a file: -i part.vdb");
     }
-    reader_ = std::make_unique<SlabReader>(
-        path_, names_.empty() ? std::vector<std::string>{} : commaList(names_));
+    reader_ = std::make_unique<SlabReader>(path_, grids_.list());
     return reader_->schema();
   }
 
@@ -44,7 +43,7 @@ class ReadOperator : public Source {
 
  private:
   std::string path_;
-  std::string names_;
+  GridListOption grids_;
   std::unique_ptr<SlabReader> reader_;
 };
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -10,17 +11,31 @@
 #include "io/image/exr.h"
 #include "io/image/picture.h"
 #include "io/image/png_runs.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/contour/voxel_faces.h"
 #include "ops/kernels/picture/ray_picture.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 
 namespace {
+
+constexpr std::array<Choice<Look>, 4> looks{
+    {{Look::area, "area", "A lamp of 30 cm, 1 m above, and some light from all around"},
+     {Look::large, "large", "A light of 2 m, 1 m above"},
+     {Look::sky, "sky", "The same light from everywhere above the horizon"},
+     {Look::staircase, "staircase",
+      "A lamp 10 degrees high on the left, so that every step casts a shadow"}}};
+
+enum class Projection { perspective, orthographic };
+constexpr std::array<Choice<Projection>, 2> projections{
+    {{Projection::perspective, "perspective", "As seen from --distance"},
+     {Projection::orthographic, "orthographic", "As seen from infinitely far away"}}};
 
 /// What a horizontal open place becomes where the user does not say: bright, but with room for what
 /// faces the light more.
@@ -37,36 +52,28 @@ class Render : public Sink {
  public:
   void declare(Options& options) override {
     options.positionals("files", files_,
-                        "The .png or .exr to write; before it, a mesh to draw in place of what "
-                        "comes down a chain: STL, OBJ or PLY");
-    options.text("grid", grid_, "NAME",
-                 "Whose surface comes down the chain: of solid its voxels, of printed, displaced "
-                 "and surface a level; auto takes the furthest down the chain");
-    options.flag("blocks", blocks_,
-                 "Draws the voxels that are inside as blocks, not their surface");
-    options.choice("look", look_, {look_names.begin(), look_names.end()},
-                   "The light: a lamp above, a large light above, a sky all around, or a lamp so "
-                   "low, from the left, that every step shows");
-    options.number("azimuth", camera_.azimuth_degrees, -360, 360,
-                   "From where it is seen: 0 from the front (-y), 90 from the right, in degrees");
-    options.number("elevation", camera_.elevation_degrees, -90, 90,
-                   "From how high: 90 from above, in degrees");
-    options.choice("projection", projection_, {"perspective", "orthographic"},
-                   "As from the eye's distance, or from infinitely far");
-    options.length("distance", distance_mm_, "From the eye to the middle of the object");
-    options.length("pixel", camera_.pixel_mm,
-                   "The side of a pixel at the middle of the object; by default what 50 cycles per "
-                   "degree need from 50 cm");
-    options.text("frame", frame_file_, "FILE",
+                        "The .png or .exr to write; before it, a mesh to draw in place of the "
+                        "volume that reaches this step: " +
+                            meshFormatNames());
+    surface_grid_.declare(options);
+    options.flag("blocks", blocks_, "Draws the voxels that are inside as blocks");
+    options.choice("look", look_, looks, "Light");
+    options.number("azimuth", camera_.azimuth_degrees, {-360, 360},
+                   "Direction of the eye in degrees: 0 is the front (-y), 90 the right");
+    options.number("elevation", camera_.elevation_degrees, {-90, 90},
+                   "Height of the eye in degrees: 90 is above");
+    options.choice("projection", projection_, projections, "Projection");
+    view_.declare(options);
+    options.file("frame", frame_file_, "FILE",
                  "Frames the picture as that of this mesh, so that pictures of its prints can be "
                  "compared with it pixel by pixel");
-    options.integer("margin", margin_, 0, 1000, "Pixels left free around it");
-    options.integer("samples", samples_, 1, 65536, "Rays for each pixel");
-    options.integer("seed", seed_, 0, 1 << 30, "Of the pattern of the rays");
-    options.number("brightness", brightness_, 0, 100,
-                   "What a horizontal open place becomes, linear, where 1 is white; 0 takes 0.6, "
-                   "and 0.2 where the light is low");
-    options.flag("overwrite", overwrite_, "Replace the picture if it is there");
+    options.integer("margin", margin_, {0, 1000}, "Pixels left free around the object");
+    options.integer("samples", samples_, {1, 65536}, "Rays for each pixel");
+    options.integer("seed", seed_, {0, 1 << 30}, "Seed of the pattern of the rays");
+    options.number("brightness", brightness_, Range::above(0, 100),
+                   "Linear brightness of an open horizontal place, where 1 is white",
+                   {"auto", "0.6, and 0.2 with --look staircase"});
+    overwrite_.declare(options, "the picture");
   }
 
   [[nodiscard]] bool standsAlone() const override { return files_.size() == 2; }
@@ -76,13 +83,10 @@ class Render : public Sink {
       throw UsageError("name the picture to write, and before it at most one mesh to draw");
     const std::string& picture = files_.back();
     if (!picture.ends_with(".png") && !picture.ends_with(".exr"))
-      throw UsageError("'" + picture + "' is no .png or .exr");
-    if (!(camera_.pixel_mm > 0)) throw UsageError("--pixel: must be more than 0 mm");
-    if (projection_ == "perspective") {
-      if (!(distance_mm_ > 0)) throw UsageError("--distance: must be more than 0 mm");
-      camera_.distance_mm = distance_mm_;
-    }
-    StagedOutput::check(picture, StagedOutput::Kind::file, overwrite_);
+      throw UsageError("'" + picture + "' must end in .png or .exr");
+    camera_.pixel_mm = view_.pixel_mm;
+    camera_.distance_mm = projection_ == Projection::perspective ? view_.distance_mm : 0;
+    StagedOutput::check(picture, StagedOutput::Kind::file, overwrite_.overwrite);
     if (!frame_file_.empty()) frame(camera_, meshOf(frame_file_), margin_);
     if (standsAlone()) {
       if (blocks_) throw UsageError("--blocks: a mesh has no voxels");
@@ -90,7 +94,7 @@ class Render : public Sink {
     }
     std::vector<std::string> there;
     for (const auto& [name, grid] : in.grids) there.push_back(name);
-    name_ = chosenSurfaceGrid(there, grid_);
+    name_ = chosenSurfaceGrid(there, surface_grid_.grid);
     lattice_ = in.lattice;
     surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
     if (blocks_) faces_.emplace(in.lattice);
@@ -129,14 +133,12 @@ class Render : public Sink {
     report().count("triangles", static_cast<double>(mesh_.triangles.size()));
     const RayScene scene(mesh_);
     mesh_ = {};
-    const auto look = static_cast<Look>(std::find(look_names.begin(), look_names.end(), look_) -
-                                        look_names.begin());
     const RayPicture picture =
-        scene.picture(camera_, look, samples_, static_cast<std::uint32_t>(seed_),
+        scene.picture(camera_, look_, samples_, static_cast<std::uint32_t>(seed_),
                       [this](double fraction) { report().progress(fraction); });
     report().count("width", picture.width);
     report().count("height", picture.height);
-    const double brightness = brightness_ > 0 ? brightness_ : brightnessOf(look);
+    const double brightness = brightness_.value_or(brightnessOf(look_));
     const std::vector<std::uint8_t> bytes =
         files_.back().ends_with(".exr") ? exrOf(picture, brightness) : pngOf(picture, brightness);
     StagedOutput staged(files_.back(), StagedOutput::Kind::file);
@@ -204,18 +206,18 @@ class Render : public Sink {
   }
 
   std::vector<std::string> files_;
-  std::string grid_ = "auto";
+  SurfaceGridOption surface_grid_;
   bool blocks_ = false;
-  std::string look_ = "area";
-  Camera camera_{.azimuth_degrees = 30, .elevation_degrees = 35, .pixel_mm = 0.0873};
-  std::string projection_ = "perspective";
-  double distance_mm_ = 500;
+  Look look_ = Look::area;
+  Camera camera_{.azimuth_degrees = 30, .elevation_degrees = 35};
+  Projection projection_ = Projection::perspective;
+  ViewOptions view_;
   std::string frame_file_;
   int margin_ = 8;
   int samples_ = 64;
   int seed_ = 0;
-  double brightness_ = 0;
-  bool overwrite_ = false;
+  std::optional<double> brightness_;
+  OverwriteOption overwrite_;
 
   std::string name_;
   Lattice lattice_;

@@ -1,6 +1,7 @@
 #include <algorithm>
-#include <charconv>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <unistd.h>
 
 #include <tbb/parallel_reduce.h>
@@ -10,8 +11,8 @@
 #include "io/vdb/vdb.h"
 #include "ops/kernels/distance/zero_set_distance.h"
 #include "ops/kernels/leaf/held_band.h"
-#include "ops/kernels/mesh/mesh_placement.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
@@ -23,6 +24,12 @@ namespace {
 using openvdb::FloatGrid;
 using openvdb::Mat4d;
 using openvdb::Vec3d;
+
+enum class Kind { automatic, level_set, fog };
+constexpr std::array<Choice<Kind>, 3> kinds{
+    {{Kind::automatic, "auto", "As the class of the grid says"},
+     {Kind::level_set, "level-set", "A level set: inside below the level"},
+     {Kind::fog, "fog", "A fog volume: inside above the level"}}};
 
 FloatGrid::ConstPtr asFloats(const GridConstPtr& grid) {
   if (auto floats = openvdb::gridConstPtrCast<FloatGrid>(grid)) return floats;
@@ -59,36 +66,28 @@ class Resample : public Source {
   void declare(Options& options) override {
     options.positional(
         "file", path_,
-        "The .vdb of any tool, with any affine transform; - or nothing is standard input", false);
-    options.text("printer", printer_, "NAME|FILE.json", "The printer whose lattice to use");
-    options.text("pitch", pitch_, "DX,DY,DZ", "The lattice's pitch, in place of a printer's");
+        "The .vdb of any tool, with any affine transform; standard input if missing or -", false);
+    target_.declare(options);
     options.text("grid", grid_name_, "NAME",
-                 "Which grid; unless given 'surface', or the only one of numbers");
-    options.choice("kind", kind_, {"auto", "level-set", "fog"},
-                   "What the grid is: a level set, inside below the level, or fog, inside above "
-                   "it; auto takes its class");
-    options.text("level", level_, "X",
-                 "The value at the surface; 0 of a level set and 0.5 of fog unless given");
-    options.choice("unit", unit_, {"mm", "cm", "m", "in", "um"},
-                   "What the numbers of the grid's transform mean");
-    options.number("scale", scale_, 1e-6, 1e6, "Scales the part about the origin");
-    options.flag("place", place_,
-                 "Puts the part on the bed: its bounding box begins at the origin");
-    options.length("band", band_mm_,
-                   "How far from the surface distances are kept; one voxel diameter along the "
-                   "normal unless given");
+                 "Grid to take; by default 'surface', or the only grid of numbers");
+    options.choice("kind", kind_, kinds, "Which side of the surface is inside");
+    options.number("level", level_, {-1e30, 1e30},
+                   "Value at the surface; by default 0 in a level set and 0.5 in fog");
+    placement_.declare(options, "the part");
+    options.length("band", band_mm_, Range::above(0, 1000),
+                   "Distance from the surface up to which distances are kept; by default one voxel "
+                   "diameter along the normal");
   }
 
   Schema plan() override {
     Schema schema;
-    const Vec3d pitch_mm = targetPitchMm(printer_, pitch_, schema);
-    if (band_mm_ < 0) throw UsageError("--band: is below zero");
+    const Vec3d pitch_mm = targetPitchMm(target_, schema);
     const FloatGrid::ConstPtr grid = readSurface(schema);
     surface_ = zeroSet(grid, pitch_mm);
     const ZeroSet::Bounds bounds = surface_->bounds();
+    const Band band{1, band_mm_.value_or(0)};
     schema.lattice =
-        latticeAround(bounds.min, bounds.max, std::max(pitch_mm.length(), band_mm_), pitch_mm);
-    const Band band{1, band_mm_};
+        latticeAround(bounds.min, bounds.max, std::max(pitch_mm.length(), band.mm), pitch_mm);
     schema.leaves = leavesOf(schema.lattice, band.greatestMm(pitch_mm));
     schema.surface_leaves =
         leavesOf(schema.lattice, std::min(band.greatestMm(pitch_mm), pitch_mm.length()));
@@ -160,22 +159,18 @@ class Resample : public Source {
     return found->second;
   }
 
-  [[nodiscard]] ZeroSet::Reading readingOf(const FloatGrid& grid) const {
-    ZeroSet::Reading reading;
-    const bool level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
-    const bool fog = grid.getGridClass() == openvdb::GRID_FOG_VOLUME;
-    if (kind_ == "auto" && !level_set && !fog)
-      throw UsageError("grid '" + grid_name_ +
-                       "' does not say what it is; give --kind level-set or --kind fog");
-    reading.above = kind_ == "fog" || (kind_ == "auto" && fog);
-    reading.level = reading.above ? 0.5F : 0.0F;
-    if (!level_.empty()) {
-      const auto [end, error] =
-          std::from_chars(level_.data(), level_.data() + level_.size(), reading.level);
-      if (error != std::errc() || end != level_.data() + level_.size() ||
-          !std::isfinite(reading.level))
-        throw UsageError("--level: '" + level_ + "' is not a number");
+  /// How the grid is to be read. Resolves what the options leave open.
+  ZeroSet::Reading readingOf(const FloatGrid& grid) {
+    if (kind_ == Kind::automatic) {
+      const bool level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
+      if (!level_set && grid.getGridClass() != openvdb::GRID_FOG_VOLUME)
+        throw UsageError(
+            "grid '" + grid_name_ +
+            "' has no class that says what it is; give --kind level-set or --kind fog");
+      kind_ = level_set ? Kind::level_set : Kind::fog;
     }
+    if (!level_) level_ = kind_ == Kind::fog ? 0.5 : 0;
+    const ZeroSet::Reading reading{static_cast<float>(*level_), kind_ == Kind::fog};
     const float outside = grid.background();
     if (reading.above ? outside > reading.level : outside < reading.level)
       throw DataError("grid '" + grid_name_ + "' is inside everywhere beyond its voxels; check " +
@@ -185,7 +180,7 @@ class Resample : public Source {
 
   std::shared_ptr<const ZeroSet> zeroSet(const FloatGrid::ConstPtr& grid, const Vec3d& pitch_mm) {
     Mat4d map = grid->transform().baseMap()->getAffineMap()->getMat4();
-    map.postScale(Vec3d(unitMm(unit_) * scale_));
+    map.postScale(Vec3d(placement_.mmPerUnit()));
     if (!(std::abs(map.det()) > 0))
       throw DataError("grid '" + grid_name_ + "' has a transform without volume");
     const ZeroSet::Reading reading = readingOf(*grid);
@@ -209,7 +204,7 @@ class Resample : public Source {
     if (surface->cells() == 0)
       throw DataError("grid '" + grid_name_ + "' has no surface: none of its values pass " +
                       shortestText(double{reading.level}) + "; check --kind and --level");
-    if (!place_) return surface;
+    if (!placement_.on_bed) return surface;
     map.postTranslate(-surface->bounds().min);
     return made(map);
   }
@@ -223,15 +218,12 @@ class Resample : public Source {
   }
 
   std::string path_;
-  std::string printer_;
-  std::string pitch_;
+  LatticeOptions target_;
   std::string grid_name_;
-  std::string kind_ = "auto";
-  std::string level_;
-  std::string unit_ = "mm";
-  double scale_ = 1;
-  bool place_ = false;
-  double band_mm_ = 0;
+  Kind kind_ = Kind::automatic;
+  std::optional<double> level_;
+  PlacementOptions placement_;
+  std::optional<double> band_mm_;
 
   double division_mm2_ = 0;  ///< the mean face of a division of a cell
   double slack_mm_ = 0;

@@ -4,7 +4,6 @@
 
 #include "io/profile/printer_profile.h"
 #include "ops/kernels/printing/gaussian_spread.h"
-#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
@@ -21,20 +20,22 @@ using openvdb::Vec3d;
 class Simulate : public Filter {
  public:
   void declare(Options& options) override {
-    options.text("spread", spread_text_, "MM|X,Y,Z",
-                 "How far a droplet spreads: standard deviation of a Gaussian, one length or one "
-                 "for each axis; by default what the printer's profile states, or else 50um");
+    options.lengths(
+        "spread", spread_mm_, "LENGTH|X,Y,Z", {0, 100},
+        "Standard deviation of the Gaussian by which a droplet spreads; by default that "
+        "of the printer's profile, or else 50um");
   }
 
   Schema plan(const Schema& in) override {
     const auto solid = findGrid<openvdb::BoolGrid>(in.grids, solid_grid);
     box_ = in.lattice.box;
-    spread_.emplace(in.lattice.pitch_mm, spreadMm(in));
+    if (!spread_mm_) spread_mm_ = usualSpreadMm(in);
+    spread_.emplace(in.lattice.pitch_mm, *spread_mm_);
     constexpr int furthest = 500;
     const openvdb::Coord reach = spread_->reach();
     if (std::max({reach.x(), reach.y(), reach.z()}) > furthest)
-      throw UsageError("--spread: droplets would reach over more than " + std::to_string(furthest) +
-                       " voxels");
+      throw UsageError("--spread: the droplets would reach over more than " +
+                       std::to_string(furthest) + " voxels; give a smaller spread");
     Schema out = in;
     out.grids[printed_grid] = makePrintedGrid(solid->transform());
     return out;
@@ -52,31 +53,15 @@ class Simulate : public Filter {
   }
 
  private:
-  [[nodiscard]] Vec3d spreadMm(const Schema& in) const {
+  static Vec3d usualSpreadMm(const Schema& in) {
     constexpr double usual_mm = 0.05;
-    if (spread_text_.empty()) {
-      const auto profile = in.metadata.find(printer_key);
-      if (profile == in.metadata.end()) return Vec3d(usual_mm);
-      const Vec3d stated = printerProfileFromJson(profile->second).point_spread_mm;
-      return stated.isZero() ? Vec3d(usual_mm) : stated;
-    }
-    const std::vector<std::string> lengths = commaList(spread_text_);
-    if (lengths.size() != 1 && lengths.size() != 3) refuse();
-    Vec3d spread_mm;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double length_mm = parseLengthMm(lengths[axis % lengths.size()]);
-      if (!(length_mm >= 0)) refuse();
-      spread_mm[static_cast<int>(axis)] = length_mm;
-    }
-    return spread_mm;
+    const auto profile = in.metadata.find(printer_key);
+    if (profile == in.metadata.end()) return Vec3d(usual_mm);
+    const Vec3d stated = printerProfileFromJson(profile->second).point_spread_mm;
+    return stated.isZero() ? Vec3d(usual_mm) : stated;
   }
 
-  [[noreturn]] void refuse() const {
-    throw UsageError("--spread: '" + spread_text_ +
-                     "' is neither a length such as 50um nor three of them");
-  }
-
-  std::string spread_text_;
+  std::optional<Vec3d> spread_mm_;
   openvdb::CoordBBox box_;
   std::optional<GaussianSpread> spread_;
 };

@@ -14,6 +14,7 @@
 #include "io/image/picture.h"
 #include "io/image/png_runs.h"
 #include "ops/kernels/picture/picture_similarity.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/engine/tool.h"
 #include "vdbdither/model/errors.h"
 
@@ -66,33 +67,27 @@ std::vector<std::uint8_t> greyPng(const Plane& map) {
 class Ssim : public Tool {
  public:
   void declare(Options& options) override {
-    options.positional("reference", reference_file_, "The picture that it should be (.png)");
-    options.positional("picture", picture_file_, "The picture to judge (.png), of the same size");
-    options.length("pixel", pixel_mm_, "The side of a pixel where it is looked at");
-    options.length("distance", distance_mm_, "How far from there the eye is");
-    options.number("background", background_, 0, 1,
-                   "The grey, sRGB-coded, behind what is transparent");
-    options.text("maps", maps_folder_, "FOLDER",
-                 "Writes the maps as ssim.png, ssim-seen.png (white where alike) and flip.png "
+    options.positional("reference", reference_file_, "Picture that the other should be (.png)");
+    options.positional("picture", picture_file_, "Picture to judge (.png), of the same size");
+    view_.declare(options);
+    options.number("background", background_, {0, 1}, "Grey behind transparent pixels, sRGB-coded");
+    options.file("maps", maps_folder_, "FOLDER",
+                 "Writes the maps ssim.png and ssim-seen.png (white where alike) and flip.png "
                  "(black where alike)");
-    options.flag("json", as_json_, "Say it as JSON");
-    options.flag("overwrite", overwrite_, "Replace the folder if it is there");
+    json_.declare(options);
+    overwrite_.declare(options, "the folder");
   }
 
   void run() override {
-    for (const auto& [name, value] :
-         {std::pair("--pixel", pixel_mm_), std::pair("--distance", distance_mm_)}) {
-      if (!(value > 0)) throw UsageError(std::string(name) + ": must be more than 0 mm");
-    }
-    const double pixels_per_degree = distance_mm_ / pixel_mm_ * std::numbers::pi / 180;
+    const double pixels_per_degree = view_.distance_mm / view_.pixel_mm * std::numbers::pi / 180;
     constexpr double least = 5;
     constexpr double most = 1000;
     if (!(pixels_per_degree >= least && pixels_per_degree <= most)) {
       throw UsageError("--pixel and --distance give " + shortestText(pixels_per_degree) +
-                       " pixels per degree; 5 to 1000 can be judged");
+                       " pixels per degree; the value must be from 5 to 1000");
     }
     if (!maps_folder_.empty())
-      StagedOutput::check(maps_folder_, StagedOutput::Kind::folder, overwrite_);
+      StagedOutput::check(maps_folder_, StagedOutput::Kind::folder, overwrite_.overwrite);
 
     const Picture reference = readPicture(reference_file_);
     const Picture picture = readPicture(picture_file_);
@@ -153,7 +148,7 @@ class Ssim : public Tool {
   [[nodiscard]] std::string textOf(const Picture& reference, std::size_t object,
                                    double pixels_per_degree,
                                    const std::array<double, 3>& means) const {
-    if (as_json_) {
+    if (json_.json) {
       return ordered_json{{"reference", reference_file_},
                           {"picture", picture_file_},
                           {"width", reference.width},
@@ -176,12 +171,11 @@ class Ssim : public Tool {
 
   std::string reference_file_;
   std::string picture_file_;
-  double pixel_mm_ = 0.0873;
-  double distance_mm_ = 500;
+  ViewOptions view_;
   double background_ = 0.5;
   std::string maps_folder_;
-  bool as_json_ = false;
-  bool overwrite_ = false;
+  JsonOption json_;
+  OverwriteOption overwrite_;
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "ops/kernels/measure/histogram.h"
 #include "ops/kernels/measure/surface_area.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
@@ -84,12 +85,13 @@ class LayerTally {
 class Stats : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", path_, "The .vdb to measure; nothing: what comes to it", false);
+    options.positional("file", path_,
+                       "The .vdb to measure in place of the volume that reaches this step", false);
     options.text("histogram", histogram_grid_, "GRID",
                  "Counts the active values of this grid of numbers in bins");
-    options.integer("bins", bins_, 2, 65536,
-                    "Bins at most; their edges are multiples of a power of two");
-    options.flag("json", json_, "Say it as JSON");
+    options.integer("bins", bins_, {2, 65536},
+                    "Maximum number of bins; their edges are multiples of a power of two");
+    json_.declare(options);
   }
 
   [[nodiscard]] std::string inputFile() const override { return path_; }
@@ -162,7 +164,7 @@ class Stats : public Sink {
       if (!layers.empty()) area_mm2_ += surfaceArea(*below_, *below_, layers, lattice_.pitch_mm);
       below_.reset();
     }
-    report().print(json_ ? jsonText() : plainText());
+    report().print(json_.json ? jsonText() : plainText());
   }
 
  private:
@@ -285,7 +287,7 @@ class Stats : public Sink {
   std::string path_;
   std::string histogram_grid_;
   int bins_ = 32;
-  bool json_ = false;
+  JsonOption json_;
 
   Lattice lattice_;
   MaterialTable materials_;

@@ -1,3 +1,4 @@
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -9,9 +10,11 @@
 
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
+#include "io/mesh/mesh_format.h"
 #include "io/vdb/frames.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
@@ -20,6 +23,11 @@
 namespace vdbdither {
 
 namespace {
+
+constexpr std::array<Choice<VdbCodec>, 3> codecs{
+    {{VdbCodec::blosc, "blosc", "Active voxels, compressed by Blosc"},
+     {VdbCodec::mask, "mask", "Active voxels, uncompressed"},
+     {VdbCodec::none, "none", "All voxels of each leaf, uncompressed"}}};
 
 /// All slabs of a grid in one, in canonical form; `pieces` is empty then.
 GridConstPtr whole(std::vector<Layers>& pieces, ZRange layers) {
@@ -43,10 +51,12 @@ GridConstPtr whole(std::vector<Layers>& pieces, ZRange layers) {
 class WriteOperator : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", path_, "The .vdb to write; - or nothing is standard output", false);
-    options.choice("codec", codec_, {"blosc", "mask", "none"}, "How a file's voxels are packed");
-    options.flag("half", half_, "A file's distances, normals and the like take 16 bits, not 32");
-    options.flag("overwrite", overwrite_, "Replace the file if it is there");
+    options.positional("file", path_, "The .vdb to write; standard output if missing or -", false);
+    options.choice("codec", codec_, codecs, "Compression of the voxels in a file");
+    options.flag("half", half_,
+                 "Stores distances, normals and other fractional numbers of a file in 16 bits, not "
+                 "32");
+    overwrite_.declare(options, "the file");
   }
 
   void plan(const Schema& in) override {
@@ -54,7 +64,7 @@ class WriteOperator : public Sink {
     if (in.grids.empty()) throw UsageError("there is no grid to write");
     if (!isPipe()) {
       refuseOtherFormats();
-      StagedOutput::check(path_, StagedOutput::Kind::file, overwrite_);
+      StagedOutput::check(path_, StagedOutput::Kind::file, overwrite_.overwrite);
       output_.emplace(path_, StagedOutput::Kind::file);
     } else if (::isatty(dataOutput())) {
       throw UsageError(
@@ -113,10 +123,7 @@ class WriteOperator : public Sink {
       contents.metadata[layers_key] =
           std::to_string(written_.begin) + " " + std::to_string(written_.end);
     }
-    const VdbCodec codec = codec_ == "none"   ? VdbCodec::none
-                           : codec_ == "mask" ? VdbCodec::mask
-                                              : VdbCodec::blosc;
-    writeVdb(output_->path(), contents, codec, path_, half_);
+    writeVdb(output_->path(), contents, codec_, path_, half_);
     output_->commit();
   }
 
@@ -124,13 +131,11 @@ class WriteOperator : public Sink {
   [[nodiscard]] bool isPipe() const { return path_.empty() || path_ == "-"; }
 
   void refuseOtherFormats() const {
+    if (meshFormatNamedBy(path_) != nullptr)
+      throw UsageError("'" + path_ +
+                       "' is a mesh by its name, and this is a .vdb; mesh-export "
+                       "writes meshes");
     const std::string extension = std::filesystem::path(path_).extension();
-    for (const char* mesh : {".stl", ".obj", ".ply"}) {
-      if (extension == mesh)
-        throw UsageError("'" + path_ +
-                         "' is a mesh by its name, and this is a .vdb; mesh-export "
-                         "writes meshes");
-    }
     for (const char* picture : {".png", ".tif", ".tiff", ".exr", ".zip"}) {
       if (extension == picture)
         throw UsageError("'" + path_ +
@@ -144,9 +149,9 @@ class WriteOperator : public Sink {
   }
 
   std::string path_;
-  std::string codec_ = "blosc";
+  VdbCodec codec_ = VdbCodec::blosc;
   bool half_ = false;
-  bool overwrite_ = false;
+  OverwriteOption overwrite_;
   Schema schema_;
   std::optional<FrameWriter> frames_;
   bool begun_ = false;

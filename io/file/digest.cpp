@@ -44,4 +44,10 @@ std::string hexText(const Digest::Value& value) {
   return text;
 }
 
+std::string sha256Of(std::span<const std::uint8_t> bytes) {
+  Digest digest;
+  digest.update(bytes.data(), bytes.size());
+  return hexText(digest.finish());
+}
+
 }  // namespace vdbdither

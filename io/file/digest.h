@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 
 namespace vdbdither {
@@ -29,5 +30,8 @@ class Digest {
 
 /// Lower-case hexadecimal.
 std::string hexText(const Digest::Value& value);
+
+/// The digest of `bytes` as that text.
+std::string sha256Of(std::span<const std::uint8_t> bytes);
 
 }  // namespace vdbdither

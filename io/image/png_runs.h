@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -18,6 +19,11 @@ enum class PngPixels {
 constexpr std::uint32_t rgba(std::uint8_t red, std::uint8_t green, std::uint8_t blue,
                              std::uint8_t alpha = 255) {
   return red | green << 8 | blue << 16 | static_cast<std::uint32_t>(alpha) << 24;
+}
+
+/// The same of a colour of four channels.
+constexpr std::uint32_t rgba(const std::array<std::uint8_t, 4>& colour) {
+  return rgba(colour[0], colour[1], colour[2], colour[3]);
 }
 
 struct PngFormat {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cmath>
 #include <cstdint>
 #include <fcntl.h>
 #include <limits>
@@ -12,9 +11,7 @@
 #include <system_error>
 #include <unistd.h>
 
-#include "io/mesh/mesh_formats.h"
-#include "io/mesh/text_cursor.h"
-#include "vdbdither/model/errors.h"
+#include "io/mesh/mesh_format.h"
 
 namespace vdbdither {
 
@@ -67,16 +64,12 @@ struct ForeignFormat {
   std::string_view name;
 };
 
-/// What is met in the place of a mesh and can be named; told by the first bytes.
+/// What is met in the place of a mesh and can be named, told by its first bytes.
 constexpr std::array foreign_formats{
     ForeignFormat{"PK\x03\x04", "3MF (or another zip archive)"},
     ForeignFormat{"glTF", "binary glTF (.glb)"},
     ForeignFormat{"{", "glTF (.gltf, or other JSON)"},
     ForeignFormat{"DRACO", "Draco (.drc)"},
-    ForeignFormat{"OFF", "OFF"},
-    ForeignFormat{"COFF", "OFF"},
-    ForeignFormat{"NOFF", "OFF"},
-    ForeignFormat{"STOFF", "OFF"},
     ForeignFormat{"ISO-10303-21", "STEP"},
 };
 
@@ -99,94 +92,36 @@ void dropUnusedVertices(Mesh& mesh) {
   }
 }
 
-Mesh parseByContent(const MeshFile& file) {
-  const std::string_view bytes = file.bytes();
-  if (bytes.empty()) file.refuse("the file is empty; export it again");
-  if (hasSizeOfBinaryStl(bytes)) return parseBinaryStl(file);
-  if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r")) return parsePly(file);
+const ForeignFormat* foreignFormatOf(const MeshFile& file) {
+  const auto* const found =
+      std::find_if(foreign_formats.begin(), foreign_formats.end(),
+                   [&](const auto& foreign) { return file.start().starts_with(foreign.magic); });
+  return found == foreign_formats.end() ? nullptr : found;
+}
 
-  TextCursor text(bytes.substr(bytes.starts_with("\xEF\xBB\xBF") ? 3 : 0));
-  text.skipSpace();
-  const std::string_view start(text.position(), bytes.data() + bytes.size());
-  for (const ForeignFormat& format : foreign_formats) {
-    if (start.starts_with(format.magic)) {
-      file.refuse(std::string(format.name) + " is not read yet; export STL, OBJ or PLY");
-    }
+const MeshFormat& formatOf(const MeshFile& file) {
+  if (file.bytes().empty()) file.refuse("the file is empty; export it again");
+  const MeshFormat* best = nullptr;
+  MeshMatch surest = MeshMatch::none;
+  for (const MeshFormat* format : meshFormats()) {
+    const MeshMatch match = format->match(file);
+    if (match <= surest) continue;
+    surest = match;
+    best = format;
   }
-
-  const bool is_text = bytes.substr(0, 1024).find('\0') == std::string_view::npos;
-  const std::size_t dot = file.name().rfind('.');
-  const std::string_view extension =
-      dot == std::string::npos ? "" : std::string_view(file.name()).substr(dot);
-  if (equalsIgnoringCase(start.substr(0, 5), "solid")) {
-    return is_text ? parseAsciiStl(file) : parseBinaryStl(file);
-  }
-  if (is_text && (looksLikeObj(start) || equalsIgnoringCase(extension, ".obj"))) {
-    return parseObj(file);
-  }
-  if (!is_text && equalsIgnoringCase(extension, ".stl")) return parseBinaryStl(file);
-  if (equalsIgnoringCase(extension, ".vdb"))
+  const ForeignFormat* foreign = surest < MeshMatch::signature ? foreignFormatOf(file) : nullptr;
+  if (foreign != nullptr)
+    file.refuse(std::string(foreign->name) + " is not read yet; export " + meshFormatNames());
+  if (best != nullptr) return *best;
+  if (file.isNamed(".vdb"))
     file.refuse("a .vdb is no mesh; read takes one of this lattice, resample any other");
-  file.refuse("not a mesh in a format that is read; export STL, OBJ or PLY");
+  file.refuse("not a mesh in a format that is read; export " + meshFormatNames());
 }
 
 }  // namespace
 
-void MeshFile::warn(const std::string& what) const {
-  if (warn_) warn_(inQuotes(name_) + ": " + what);
-}
-
-void MeshFile::warnAtLine(const char* position, const std::string& what) const {
-  if (warn_) warn_(inQuotes(name_) + ", line " + lineOf(position) + ": " + what);
-}
-
-void MeshFile::refuse(const std::string& why) const {
-  throw DataError(inQuotes(name_) + ": " + why);
-}
-
-void MeshFile::refuseAtLine(const char* position, const std::string& why) const {
-  throw DataError(inQuotes(name_) + ", line " + lineOf(position) + ": " + why);
-}
-
-void MeshFile::refuseAtByte(const char* position, const std::string& why) const {
-  throw DataError(inQuotes(name_) + ", byte " + std::to_string(position - bytes_.data()) + ": " +
-                  why);
-}
-
-std::string MeshFile::lineOf(const char* position) const {
-  std::size_t line = 1;
-  for (const char* at = bytes_.data(); at != position; ++at) {
-    line += *at == '\n' || (*at == '\r' && at + 1 != position && at[1] != '\n');
-  }
-  return std::to_string(line);
-}
-
-std::string inQuotes(std::string_view text) {
-  constexpr std::size_t longest = 200;
-  std::string result = "'";
-  for (const char c : text.substr(0, longest)) {
-    const bool control = static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
-    result += control ? '?' : c;
-  }
-  return result + (text.size() > longest ? "...'" : "'");
-}
-
-std::string shown(const openvdb::Vec3d& position) {
-  const auto word = [](double value) {
-    if (std::isnan(value)) return std::string("nan");
-    std::array<char, 32> digits{};
-    const auto end = std::to_chars(digits.begin(), digits.end(), value).ptr;
-    return std::string(digits.begin(), end);
-  };
-  return word(position.x()) + " " + word(position.y()) + " " + word(position.z());
-}
-
-bool isFinite(const openvdb::Vec3d& position) {
-  return std::isfinite(position.x()) && std::isfinite(position.y()) && std::isfinite(position.z());
-}
-
 Mesh parseMesh(const MeshFile& file) {
-  Mesh mesh = parseByContent(file);
+  Mesh mesh = formatOf(file).read(file);
   if (mesh.triangles.empty()) file.refuse("holds no triangles; export a surface mesh");
   dropUnusedVertices(mesh);
   return mesh;

@@ -4,12 +4,13 @@
 #include <functional>
 #include <string>
 
+#include "io/mesh/mesh_file.h"
 #include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 
-/// Reads a triangle mesh from an STL (binary or ASCII), OBJ or PLY (ASCII or binary) file. The
-/// content decides which it is, not the name.
+/// Reads a triangle mesh from a file of any of the `meshFormats`. The content decides which it is,
+/// and the name only where the content leaves it open.
 ///
 /// Guarantees: at least one triangle, finite positions, indices in range, no vertex without a
 /// triangle, vertices in the order of their first appearance in the file. Corners of an STL at
@@ -21,5 +22,8 @@ namespace vdbdither {
 /// @throws DataError for everything else: what is wrong, on which line or byte, and what to do
 Mesh readMesh(const std::filesystem::path& path,
               const std::function<void(const std::string&)>& warn);
+
+/// The same for a file whose bytes are in memory.
+Mesh parseMesh(const MeshFile& file);
 
 }  // namespace vdbdither

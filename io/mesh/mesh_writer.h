@@ -5,35 +5,25 @@
 #include <filesystem>
 #include <memory>
 #include <span>
-#include <string>
-#include <vector>
 
 #include <openvdb/Types.h>
 
+#include "io/mesh/mesh_format.h"
 #include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
 
-/// What the vertices of a mesh file carry besides their positions. STL and OBJ carry nothing.
-struct VertexExtras {
-  bool colour = false;   ///< PLY's red, green, blue
-  bool quality = false;  ///< PLY's quality, as MeshLab calls a scalar per vertex
-  std::string comment;   ///< a line of PLY's header
-};
-
-/// A mesh on its way into a file: binary STL, OBJ or binary little-endian PLY, by the name's
-/// extension. It comes in pieces, and only what later pieces still need is kept in memory.
-/// Coordinates are floats. The file appears when it is complete.
+/// A mesh on its way into a file of one of the `meshFormats`, by the ending of its name. It comes
+/// in pieces, and only what later pieces still need is kept in memory. Coordinates are floats. The
+/// file appears when it is complete.
 class MeshWriter {
  public:
-  /// Whether `path` names a mesh file that can be written. Throws UsageError.
+  /// Checks that `path` names a mesh file that can be written. Throws UsageError.
   static void check(const std::filesystem::path& path, bool overwrite);
 
+  /// @param extras  what a format that does not hold them passes over
   /// Throws DataError.
-  explicit MeshWriter(const std::filesystem::path& path, VertexExtras extras = {});
-  MeshWriter(const MeshWriter&) = delete;
-  MeshWriter& operator=(const MeshWriter&) = delete;
-  ~MeshWriter();
+  explicit MeshWriter(const std::filesystem::path& path, const VertexExtras& extras = {});
 
   /// Adds vertices (mm) behind those before, and triangles that count them all. Throws DataError
   /// when the disk is full or the format cannot count so many.
@@ -51,13 +41,8 @@ class MeshWriter {
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
 
  private:
-  class Format;
-  class Indexed;
-  class Stl;
-  class Obj;
-  class Ply;
-
-  std::unique_ptr<Format> format_;
+  const MeshFormat& format_;
+  std::unique_ptr<MeshEncoder> encoder_;
   std::uint64_t vertices_ = 0;
   std::uint64_t triangles_ = 0;
 };

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "io/mesh/mesh_formats.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/polygon.h"
 #include "io/mesh/text_cursor.h"
 
@@ -67,8 +67,7 @@ std::uint32_t parseCorner(const MeshFile& file, const char* line, std::string_vi
   return static_cast<std::uint32_t>(index > 0 ? index - 1 : index + count);
 }
 
-}  // namespace
-
+/// Whether the first statement is one of OBJ's, or there are only comments.
 bool looksLikeObj(std::string_view bytes) {
   for (TextCursor text(bytes); !text.atEnd(); text.skipLine()) {
     const std::string_view word = text.word();
@@ -78,13 +77,13 @@ bool looksLikeObj(std::string_view bytes) {
   return true;
 }
 
-Mesh parseObj(const MeshFile& file) {
+Mesh readObj(const MeshFile& file) {
   Mesh mesh;
   PolygonCollector polygons(file, mesh);
   std::vector<std::uint32_t> corners;
   std::size_t ignored = 0;
   const char* first_ignored = nullptr;
-  TextCursor text(file.bytes().substr(file.bytes().starts_with("\xEF\xBB\xBF") ? 3 : 0));
+  TextCursor text(file.text());
   for (; !text.atEnd(); text.skipLine()) {
     const char* line = text.position();
     const std::string_view statement = text.word();
@@ -110,5 +109,51 @@ Mesh parseObj(const MeshFile& file) {
   }
   return mesh;
 }
+
+MeshMatch matchObj(const MeshFile& file) {
+  if (!file.isText()) return MeshMatch::none;
+  if (looksLikeObj(file.start())) return MeshMatch::likely;
+  return file.isNamed(".obj") ? MeshMatch::name : MeshMatch::none;
+}
+
+class ObjEncoder : public IndexedMeshEncoder {
+ public:
+  explicit ObjEncoder(const std::filesystem::path& path) : IndexedMeshEncoder(path) {
+    file_.append("# vdbdither, mm\n");
+  }
+
+  void vertex(const MeshVertex& vertex) override {
+    file_.append("v");
+    for (int axis = 0; axis < 3; ++axis) {
+      file_.append(" ");
+      file_.appendNumber(vertex.position[axis]);
+    }
+    file_.append("\n");
+  }
+
+  void triangle(const Mesh::Triangle& triangle) override {
+    faces_.append("f");
+    for (const std::uint32_t vertex : triangle)
+      faces_.append(" " + std::to_string(std::uint64_t{vertex} + 1));
+    faces_.append("\n");
+  }
+
+ protected:
+  void finish(std::uint64_t, std::uint64_t) override { file_.appendAllOf(faces_); }
+};
+
+}  // namespace
+
+extern const MeshFormat obj;
+const MeshFormat obj{.name = "OBJ",
+                     .ending = ".obj",
+                     .match = matchObj,
+                     .read = readObj,
+                     .write = [](const std::filesystem::path& path,
+                                 const VertexExtras&) -> std::unique_ptr<MeshEncoder> {
+                       return std::make_unique<ObjEncoder>(path);
+                     },
+                     .bytes_per_vertex = 74,
+                     .us_per_vertex = 0.55};
 
 }  // namespace vdbdither

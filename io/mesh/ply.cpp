@@ -5,12 +5,13 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
+#include <limits>
 #include <optional>
 #include <string>
-#include <type_traits>
+#include <utility>
+#include <vector>
 
-#include "io/mesh/mesh_formats.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/polygon.h"
 #include "io/mesh/text_cursor.h"
 
@@ -412,11 +413,78 @@ class BodyParser {
   std::vector<std::uint32_t> corners_;
 };
 
-}  // namespace
-
-Mesh parsePly(const MeshFile& file) {
+Mesh readPly(const MeshFile& file) {
   const Header header = HeaderParser(file).parse();
   return BodyParser(file, header).parse(file, header);
 }
+
+MeshMatch matchPly(const MeshFile& file) {
+  const std::string_view bytes = file.bytes();
+  const bool is_ply = bytes.starts_with("ply\n") || bytes.starts_with("ply\r");
+  return is_ply ? MeshMatch::signature : MeshMatch::none;
+}
+
+/// Binary and little-endian.
+class PlyEncoder : public IndexedMeshEncoder {
+ public:
+  PlyEncoder(const std::filesystem::path& path, VertexExtras extras)
+      : IndexedMeshEncoder(path), extras_(std::move(extras)) {
+    file_.append(header(0, 0));
+  }
+
+  void vertex(const MeshVertex& vertex) override {
+    file_.appendValue(vertex.position);
+    if (extras_.colour) file_.appendValue(vertex.colour);
+    if (extras_.quality) file_.appendValue(vertex.quality);
+  }
+
+  void triangle(const Mesh::Triangle& triangle) override {
+    faces_.appendValue(std::uint8_t{3});
+    faces_.appendValue(triangle);
+  }
+
+ protected:
+  void finish(std::uint64_t vertices, std::uint64_t triangles) override {
+    file_.appendAllOf(faces_);
+    const std::string text = header(vertices, triangles);
+    file_.patch(0, text.data(), text.size());
+  }
+
+ private:
+  /// Of the same length for every count.
+  [[nodiscard]] std::string header(std::uint64_t vertices, std::uint64_t triangles) const {
+    const std::string vertex_count = std::to_string(vertices);
+    const std::string face_count = std::to_string(triangles);
+    constexpr std::size_t digits = 20;
+    std::string text = "ply\nformat binary_little_endian 1.0\ncomment vdbdither, mm";
+    text.append(2 * digits - vertex_count.size() - face_count.size(), ' ');
+    text += "\n";
+    if (!extras_.comment.empty()) text += "comment " + extras_.comment + "\n";
+    text += "element vertex " + vertex_count +
+            "\nproperty float x\nproperty float y\nproperty float z\n";
+    if (extras_.colour) text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    if (extras_.quality) text += "property float quality\n";
+    return text + "element face " + face_count +
+           "\nproperty list uchar int vertex_indices\nend_header\n";
+  }
+
+  VertexExtras extras_;
+};
+
+}  // namespace
+
+extern const MeshFormat ply;
+const MeshFormat ply{.name = "PLY",
+                     .ending = ".ply",
+                     .match = matchPly,
+                     .read = readPly,
+                     .write = [](const std::filesystem::path& path,
+                                 const VertexExtras& extras) -> std::unique_ptr<MeshEncoder> {
+                       return std::make_unique<PlyEncoder>(path, extras);
+                     },
+                     .holds_extras = true,
+                     .most = std::numeric_limits<std::int32_t>::max(),
+                     .bytes_per_vertex = 38,
+                     .us_per_vertex = 0.2};
 
 }  // namespace vdbdither

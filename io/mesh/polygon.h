@@ -6,7 +6,7 @@
 
 #include <openvdb/Types.h>
 
-#include "io/mesh/mesh_formats.h"
+#include "io/mesh/mesh_file.h"
 #include "vdbdither/model/mesh.h"
 
 namespace vdbdither {

@@ -1,17 +1,21 @@
 // STL as it is found in the wild: the binary and ASCII forms of the StereoLithography Interface
 // Specification (3D Systems, 1988), several solids to a file, headers that lie.
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <vector>
 
-#include "io/mesh/mesh_formats.h"
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/text_cursor.h"
 
 namespace vdbdither {
 
 using openvdb::Vec3d;
+using openvdb::Vec3s;
 
 namespace {
 
@@ -153,14 +157,13 @@ std::size_t countFacets(const MeshFile& file) {
   return announced;
 }
 
-}  // namespace
-
+/// Whether the size is exactly that of a binary STL with as many triangles as its header announces.
 bool hasSizeOfBinaryStl(std::string_view bytes) {
   return bytes.size() >= header_size &&
          bytes.size() - header_size == littleEndian32(bytes.data() + header_size - 4) * facet_size;
 }
 
-Mesh parseBinaryStl(const MeshFile& file) {
+Mesh readBinaryStl(const MeshFile& file) {
   const std::size_t count = countFacets(file);
   Welder welder(file);
   welder.reserve(count);
@@ -182,9 +185,9 @@ Mesh parseBinaryStl(const MeshFile& file) {
   return welder.take();
 }
 
-Mesh parseAsciiStl(const MeshFile& file) {
+Mesh readAsciiStl(const MeshFile& file) {
   Welder welder(file);
-  TextCursor text(file.bytes().substr(file.bytes().starts_with("\xEF\xBB\xBF") ? 3 : 0));
+  TextCursor text(file.text());
   std::array<Vec3d, 3> corners;
   std::size_t corner_count = 0;
   bool in_loop = false;
@@ -235,5 +238,77 @@ Mesh parseAsciiStl(const MeshFile& file) {
   }
   return welder.take();
 }
+
+bool startsLikeAscii(const MeshFile& file) {
+  return equalsIgnoringCase(file.start().substr(0, 5), "solid");
+}
+
+MeshMatch matchStl(const MeshFile& file) {
+  if (hasSizeOfBinaryStl(file.bytes())) return MeshMatch::proof;
+  if (startsLikeAscii(file)) return MeshMatch::likely;
+  return !file.isText() && file.isNamed(".stl") ? MeshMatch::name : MeshMatch::none;
+}
+
+Mesh readStl(const MeshFile& file) {
+  const bool is_ascii = !hasSizeOfBinaryStl(file.bytes()) && startsLikeAscii(file) && file.isText();
+  return is_ascii ? readAsciiStl(file) : readBinaryStl(file);
+}
+
+/// Header of 80 bytes, count, and 50 bytes a triangle.
+class StlEncoder : public MeshEncoder {
+ public:
+  explicit StlEncoder(const std::filesystem::path& path) : MeshEncoder(path) {
+    std::array<char, header_size> header{};
+    constexpr std::string_view title = "vdbdither, mm";
+    std::copy(title.begin(), title.end(), header.begin());
+    file_.append(header.data(), header.size());
+  }
+
+  void vertex(const MeshVertex& vertex) override { kept_.push_back(vertex.position); }
+
+  void triangle(const Mesh::Triangle& t) override {
+    static_assert(std::endian::native == std::endian::little);
+    const std::array<Vec3s, 3> corners{kept_[t[0] - first_], kept_[t[1] - first_],
+                                       kept_[t[2] - first_]};
+    const Vec3d across = Vec3d(corners[1] - corners[0]).cross(Vec3d(corners[2] - corners[0]));
+    const double length = across.length();
+    const Vec3s normal(length > 0 ? across / length : Vec3d(0));
+    std::array<char, facet_size> record{};
+    std::memcpy(record.data(), &normal, 12);
+    for (std::size_t n = 0; n < 3; ++n) std::memcpy(record.data() + 12 + 12 * n, &corners[n], 12);
+    file_.append(record.data(), record.size());
+  }
+
+  void forgetBefore(std::uint32_t vertex) override {
+    if (vertex <= first_) return;
+    kept_.erase(kept_.begin(), kept_.begin() + (vertex - first_));
+    first_ = vertex;
+  }
+
+ protected:
+  void finish(std::uint64_t, std::uint64_t triangles) override {
+    const auto count = static_cast<std::uint32_t>(triangles);
+    file_.patch(header_size - 4, &count, sizeof count);
+  }
+
+ private:
+  std::vector<Vec3s> kept_;
+  std::uint32_t first_ = 0;
+};
+
+}  // namespace
+
+extern const MeshFormat stl;
+const MeshFormat stl{.name = "STL",
+                     .ending = ".stl",
+                     .match = matchStl,
+                     .read = readStl,
+                     .write = [](const std::filesystem::path& path,
+                                 const VertexExtras&) -> std::unique_ptr<MeshEncoder> {
+                       return std::make_unique<StlEncoder>(path);
+                     },
+                     .most = std::numeric_limits<std::uint32_t>::max(),
+                     .bytes_per_vertex = 100,
+                     .us_per_vertex = 0.2};
 
 }  // namespace vdbdither

@@ -4,8 +4,6 @@
 #include <cmath>
 
 #include "io/profile/printer_profile.h"
-#include "vdbdither/engine/comma_list.h"
-#include "vdbdither/engine/options.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/known_grids.h"
 
@@ -15,25 +13,14 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::Vec3d;
 
-Vec3d targetPitchMm(const std::string& printer, const std::string& pitch, Schema& schema) {
-  if (printer.empty() == pitch.empty())
+Vec3d targetPitchMm(const LatticeOptions& target, Schema& schema) {
+  if (target.printer.empty() != target.pitch_mm.has_value())
     throw UsageError(
         "give either --printer NAME (vdbdither printers lists them) or --pitch DX,DY,DZ");
-  if (!printer.empty()) {
-    const PrinterProfile profile = readPrinterProfile(printer);
-    schema.metadata[printer_key] = toJson(profile);
-    return profile.pitch_mm;
-  }
-  const std::vector<std::string> lengths = commaList(pitch);
-  if (lengths.size() != 3)
-    throw UsageError("--pitch: '" + pitch + "' is not three lengths such as 42um,84um,22um");
-  Vec3d pitch_mm;
-  for (int axis = 0; axis < 3; ++axis) {
-    pitch_mm[axis] = parseLengthMm(lengths[static_cast<std::size_t>(axis)]);
-    if (!(pitch_mm[axis] >= 1e-3 && pitch_mm[axis] <= 10))
-      throw UsageError("--pitch: '" + pitch + "' is not between 1 um and 10 mm in every axis");
-  }
-  return pitch_mm;
+  if (target.pitch_mm) return *target.pitch_mm;
+  const PrinterProfile profile = readPrinterProfile(target.printer);
+  schema.metadata[printer_key] = toJson(profile);
+  return profile.pitch_mm;
 }
 
 Lattice latticeAround(const Vec3d& min_mm, const Vec3d& max_mm, double margin_mm,

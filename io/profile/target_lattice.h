@@ -1,21 +1,17 @@
 #pragma once
 
-#include <string>
-
 #include <openvdb/Types.h>
 
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/schema.h"
 
 namespace vdbdither {
 
-/// The pitch that --printer or --pitch asks a source for, mm; a printer's profile goes into the
-/// schema's metadata.
+/// The pitch in mm that --printer or --pitch asks a source for. A printer's profile goes into the
+/// metadata of `schema`.
 ///
-/// \param printer  name or file of a profile, or empty
-/// \param pitch    DX,DY,DZ: three lengths between 1 µm and 10 mm, or empty
-///
-/// Throws UsageError unless one of the two is given and sound, and what readPrinterProfile throws.
-openvdb::Vec3d targetPitchMm(const std::string& printer, const std::string& pitch, Schema& schema);
+/// Throws UsageError unless exactly one of the two is given, and what readPrinterProfile throws.
+openvdb::Vec3d targetPitchMm(const LatticeOptions& target, Schema& schema);
 
 /// The lattice of a part between `min_mm` and `max_mm`, with the voxels within `margin_mm` of that
 /// box. Along y come `refine_y` voxels in place of one, their centres symmetrically about its own.

@@ -150,16 +150,19 @@ class Manners(ProgramTest):
 
     def test_what_is_forgotten_is_named(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
-        self.refuse(2, "slice-export: no folder is given; see --help", "mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!",
+        self.refuse(2, "slice-export: 'folder' is missing; see --help", "mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!",
                     "slice-export")
-        self.refuse(2, "mesh2sdf: no mesh is given; see --help", "mesh2sdf", *MIMAKI)
+        self.refuse(2, "mesh2sdf: 'mesh' is missing; see --help", "mesh2sdf", *MIMAKI)
         (self.folder / "part.vdb").write_bytes(b"anything")
         self.refuse(1, "mesh2sdf: 'part.vdb': a .vdb is no mesh; read takes one of this lattice, resample any other",
                     "mesh2sdf", "part.vdb", *MIMAKI, "-o", "x.vdb")
 
-    def test_a_length_below_zero_is_refused(self):
+    def test_a_length_out_of_range_is_refused(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
-        self.refuse(2, "mesh2sdf: --fit: -3 mm is below zero", "mesh2sdf", "part.stl", *MIMAKI, "--fit", "-3", "-o", "x.vdb")
+        for length in ("-3", "-0", "0mm", "1e9mm"):
+            self.refuse(2, f"mesh2sdf: --fit: '{length}' is not accepted; the length must be greater than 0 mm, up to 100000 mm",
+                        "mesh2sdf", "part.stl", *MIMAKI, "--fit", length, "-o", "x.vdb")
+        self.refuse(2, "mesh2sdf: --fit: the value is missing; give --fit LENGTH", "mesh2sdf", "part.stl", *MIMAKI, "--fit")
 
     def test_a_call_without_words_shows_what_there_is(self):
         done = self.run_program()

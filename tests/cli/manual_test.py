@@ -55,7 +55,7 @@ class Manual(ProgramTest):
         self.assertIn("slice-export", self.completed("mesh2sdf", "part.stl", "!", "sl"))
         self.assertEqual(self.completed("dither", "--disp"), ["--displaced"])
         self.assertEqual(self.completed("read", "a.vdb", "!", "dither", "--at", ""),
-                         ["preset", "closest", "foot", "voxel"])
+                         ["closest", "foot", "voxel"])
         self.assertEqual(self.completed("mesh2sdf", "part.stl", "--printer", "mim"), ["mimaki-3duj-553"])
         self.assertEqual(self.completed("help", "prin"), ["printers"])
         (self.folder / "part.stl").touch()
@@ -75,7 +75,7 @@ class Manual(ProgramTest):
             self.skipTest("neither zsh nor fish is installed")
 
     def test_what_the_manuals_are_is_told(self):
-        self.refuse(2, "'html' is none of markdown, man, completion", "docs", "html", "out")
+        self.refuse(2, "kind: 'html' is not accepted; choose markdown, man or completion", "docs", "html", "out")
 
 
 if __name__ == "__main__":

@@ -111,11 +111,11 @@ class Masks(ProgramTest):
             self.assertEqual(self.listing(), before)
 
     def test_what_no_mask_takes_is_refused(self):
-        self.refuse(2, "--sigma: of the blue noise, and --mask is 'white'; blue and paper take it", "dither", "-i", "part.vdb",
+        self.refuse(2, "--sigma: only --mask blue and --mask paper have it; leave it out", "dither", "-i", "part.vdb",
                     "--mask", "white", "--sigma", 1, "-o", "x.vdb")
-        self.refuse(2, "--size: of the blue noise, and --mask is 'none'; blue and paper take it", "dither", "-i", "part.vdb",
+        self.refuse(2, "--size: only --mask blue and --mask paper have it; leave it out", "dither", "-i", "part.vdb",
                     "--mask", "none", "--size", 32, "-o", "x.vdb")
-        self.refuse(2, "--sigma: 0.2 is out of range; 0.3 to 16 are accepted", "dither", "-i", "part.vdb", "--sigma", 0.2,
+        self.refuse(2, "--sigma: '0.2' is not accepted; the value must be a number from 0.3 to 16", "dither", "-i", "part.vdb", "--sigma", 0.2,
                     "-o", "x.vdb")
 
 

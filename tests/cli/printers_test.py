@@ -43,8 +43,9 @@ class Printers(ProgramTest):
         self.assertEqual(self.run_program("printers", "check", "none.json").stdout.decode(), "the text is no JSON object\n")
 
     def test_what_is_no_action_is_told(self):
-        self.refuse(2, "printers: action: 'sell' is none of list, show, check", "printers", "sell")
-        self.refuse(2, "printers: no printer is given", "printers", "show")
+        self.refuse(2, "printers: action: 'sell' is not accepted; choose list, show or check", "printers", "sell")
+        self.refuse(2, "printers: 'printer' is missing; see --help", "printers", "show")
+        self.refuse(2, "printers: 'x' is not expected; printers show x describes it", "printers", "list", "x")
         self.refuse(2, "no operator or command 'printer'; did you mean 'printers'?", "printer")
 
 

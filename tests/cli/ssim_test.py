@@ -92,7 +92,7 @@ class Ssim(ProgramTest):
         self.refuse(1, "'tiny.png' has 10 x 10 pixels; 11 x 11 is the least", "ssim", "tiny.png", "tiny.png")
         self.refuse(1, "'nothing.png' shows nothing: all of it is transparent", "ssim", "nothing.png", "nothing.png")
         self.refuse(1, "no such file 'none.png'", "ssim", "a.png", "none.png")
-        self.refuse(2, "--pixel: must be more than 0 mm", "ssim", "a.png", "a.png", "--pixel", "0")
+        self.refuse(2, "--pixel: '0' is not accepted; the length must be greater than 0 mm", "ssim", "a.png", "a.png", "--pixel", "0")
         self.refuse(2, "give 0.9996", "ssim", "a.png", "a.png", "--distance", "5mm")
         (self.folder / "maps").mkdir()
         (self.folder / "maps/old").touch()

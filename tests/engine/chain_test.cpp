@@ -47,5 +47,18 @@ TEST(Chain, WordsAreCutAsAShellWould) {
   EXPECT_THROW(splitWords("mesh2sdf 'part.stl"), UsageError);
 }
 
+TEST(Chain, EscapesBelongToDollarQuotes) {
+  EXPECT_THAT(splitWords(R"(a$'\n\t\r\x41\'\\'b '\n' $x)"),
+              ElementsAre("a\n\t\rA'\\b", R"(\n)", "$x"));
+  EXPECT_THROW(splitWords(R"($'a\')"), UsageError);
+}
+
+TEST(Chain, ASingleHashBeginsAComment) {
+  EXPECT_THAT(splitWords("dither --at foot # vdbdither 0.1 | x\n! write a.vdb"),
+              ElementsAre("dither", "--at", "foot", "!", "write", "a.vdb"));
+  EXPECT_THAT(splitWords("--background #ff0000 a#b '#' #"),
+              ElementsAre("--background", "#ff0000", "a#b", "#"));
+}
+
 }  // namespace
 }  // namespace vdbdither

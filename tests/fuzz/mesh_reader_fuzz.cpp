@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "io/mesh/mesh_formats.h"
+#include "io/mesh/mesh_reader.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {

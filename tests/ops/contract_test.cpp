@@ -1,7 +1,6 @@
 #include "tests/support/contract.h"
 
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 
 #include <gtest/gtest.h>
@@ -58,9 +57,7 @@ class Contract : public testing::TestWithParam<const OperatorInfo*> {
     fs::current_path(folder);
     const Mesh part =
         test::transformed(test::torusMesh({0, 0, 0}, 0.7, 0.3, 40), {20, 35, 0}, {0.11, 0.2, 0.3});
-    const std::string bytes = test::binaryStl(part);
-    std::ofstream("part.stl", std::ios::binary)
-        .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    scratch_.write(name + "/part.stl", test::binaryStl(part));
     return folder;
   }
 
@@ -106,7 +103,10 @@ TEST_P(Contract, ItsWordsAreOfOneStyle) {
   const std::unique_ptr<Operator> made = GetParam()->make();
   made->declare(options);
   expect_style(std::string(GetParam()->summary));
-  for (const Option& option : options.all()) expect_style(option.help);
+  for (const Option& option : options.all()) {
+    expect_style(option.help);
+    for (const Word& word : option.words) expect_style(word.meaning);
+  }
 }
 
 TEST_P(Contract, SlabHeightAndThreadsChangeNoByte) {
@@ -151,6 +151,45 @@ TEST_P(Contract, ItKeepsWhatAFilterPromises) {
   filter->plan(schema);
   for (const int height : {8, 40})
     EXPECT_EQ(firstBreach(*filter, schema, contents.grids, height), "");
+}
+
+/// Without what consumes grids, and without the names of their files.
+std::vector<Step> onlyMakers(const std::vector<Step>& steps) {
+  std::vector<Step> makers;
+  for (Step step : steps) {
+    const auto output = std::find(step.arguments.begin(), step.arguments.end(), "-o");
+    if (output != step.arguments.end()) step.arguments.erase(output, output + 2);
+    if (!dynamic_cast<Sink*>(findOperator(step.verb).make().get())) makers.push_back(step);
+  }
+  return makers;
+}
+
+/// The chain that a history tells of: its last source and what follows.
+std::vector<Step> stepsOf(const std::string& history) {
+  std::vector<Step> steps;
+  std::istringstream text(history);
+  for (std::string line; std::getline(text, line);) {
+    const std::vector<Step> step = parseChain(splitWords(line));
+    EXPECT_EQ(step.size(), 1U) << line;
+    if (dynamic_cast<Source*>(findOperator(step.front().verb).make().get())) steps.clear();
+    steps.push_back(step.front());
+  }
+  return steps;
+}
+
+TEST_P(Contract, ItsHistoryRunsAgainToTheSameBytes) {
+  std::vector<std::vector<Step>> before = chains();
+  std::vector<Step> steps = onlyMakers(before.back());
+  before.pop_back();
+  if (steps.empty()) GTEST_SKIP() << "its example makes no grid";
+  for (const std::vector<Step>& chain : before) runChain(chain);
+  steps.push_back({"write", {"made.vdb"}});
+  runChain(steps);
+  std::vector<Step> again = stepsOf(readVdb("made.vdb").metadata.at("vdbdither:history"));
+  EXPECT_EQ(again.size(), steps.size() - 1 - (steps.front().verb == "read" ? 1 : 0));
+  again.push_back({"write", {"again.vdb"}});
+  runChain(again);
+  EXPECT_TRUE(test::fileBytes("made.vdb") == test::fileBytes("again.vdb"));
 }
 
 std::string nameOf(const testing::TestParamInfo<const OperatorInfo*>& info) {

@@ -237,12 +237,17 @@ TEST(Dither, RefusesAmplitudesBeyondEightAndPlacesItDoesNotKnow) {
   for (const std::string bad : {"8.1", "-1", "nan", "4x", "much"}) {
     EXPECT_THAT(planning("--amplitude", bad),
                 ThrowsMessage<UsageError>("--amplitude: '" + bad +
-                                          "' is neither 'adapted' nor a number from 0 to 8"));
+                                          "' is not accepted; the value must be a number from 0 "
+                                          "to 8, or adapted"));
   }
   EXPECT_THROW(planning("--at", "surface")(), UsageError);
   EXPECT_THROW(planning("--guard", "all")(), UsageError);
-  EXPECT_THAT(planning("--spread", "2mm"),
-              ThrowsMessage<UsageError>("--spread: 2 mm is not between 0.01 mm and 1 mm"));
+  for (const std::string bad : {"2mm", "9um", "1e9mm"}) {
+    EXPECT_THAT(planning("--spread", bad),
+                ThrowsMessage<UsageError>("--spread: '" + bad +
+                                          "' is not accepted; the length must be from 0.01 mm to "
+                                          "1 mm"));
+  }
   EXPECT_THROW(test::filterCalled("dither", {"--preset", "worst"}), UsageError);
 }
 

@@ -66,7 +66,7 @@ TEST(Hollow, RefusesDrainsThatAreNone) {
   const auto drained = [](const std::string& drain) {
     return planning(ballWithBand(0.4), {"--thickness", "0.2", "--drain", drain});
   };
-  for (const char* bad : {"", "1,2,3", "0,0,0:0,0,1", "0,0,0:0,0,1:", "0,0,0:0,0,1:x"}) {
+  for (const char* bad : {"", "1,2,3", "0,0,0:0,0,1", "0,0,0:0,0,1:", "0,0,0:0,0,1:x", "1e300,0,0:0,0,1:1", "0,0,0:1e200,1e200,1:1"}) {
     EXPECT_THAT(drained(bad), ThrowsMessage<UsageError>(
                                   HasSubstr("is not a position, a direction and a diameter")))
         << bad;
@@ -94,7 +94,10 @@ TEST(Hollow, TakesSeveralDrains) {
 
 TEST(Hollow, RefusesToRunWithoutAThicknessOrASurface) {
   EXPECT_THAT(planning(ballWithBand(0.4), {}),
-              ThrowsMessage<UsageError>("--thickness: give a length above zero"));
+              ThrowsMessage<UsageError>("'--thickness' is missing; see --help"));
+  EXPECT_THAT(planning(ballWithBand(0.4), {"--thickness", "0"}),
+              ThrowsMessage<UsageError>("--thickness: '0' is not accepted; the length must be "
+                                        "greater than 0 mm, up to 1000 mm"));
   EXPECT_THAT(planning(test::schemaOf(lattice, {}), {"--thickness", "1"}),
               ThrowsMessage<DataError>("no grid 'surface'; there is none"));
 }

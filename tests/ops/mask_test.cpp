@@ -168,17 +168,19 @@ TEST(Mask, ImpossibleSizesAndSigmasAreRefusedBeforeWork) {
     }
     return "accepted";
   };
-  EXPECT_EQ(refusal({"--size", "8,0,8"}),
-            "--size: 0 is no period; whole numbers from 1 to 256 are");
-  EXPECT_EQ(refusal({"--size", "257"}),
-            "--size: 257 is no period; whole numbers from 1 to 256 are");
-  EXPECT_EQ(refusal({"--size", "8.5"}),
-            "--size: 8.5 is no period; whole numbers from 1 to 256 are");
+  for (const char* size : {"8,0,8", "257", "8.5"}) {
+    EXPECT_EQ(refusal({"--size", size}),
+              "--size: '" + std::string(size) +
+                  "' is not accepted; the value must be one whole number or three, separated by "
+                  "commas, each from 1 to 256");
+  }
   EXPECT_EQ(refusal({"--size", "12", "--kind", "bayer"}),
-            "--size: 12 is no power of two, which --kind bayer needs");
+            "--size: --kind bayer needs a power of two, not 12");
   EXPECT_EQ(refusal({"--size", "8,12,10", "--kind", "gradient-noise"}),
-            "--size: 10 is no multiple of --cell 4");
-  EXPECT_EQ(refusal({"--sigma", "0.2"}), "--sigma: 0.2 is out of range; 0.3 to 16 are accepted");
+            "--size: --kind gradient-noise needs a multiple of --cell 4, not 10");
+  EXPECT_EQ(refusal({"--sigma", "0.2"}),
+            "--sigma: '0.2' is not accepted; the value must be one number or three, separated by "
+            "commas, each from 0.3 to 16");
   EXPECT_EQ(refusal({"--size", "8"}), "accepted");
 }
 

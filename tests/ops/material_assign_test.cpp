@@ -191,7 +191,8 @@ TEST(MaterialAssign, RefusesWhatItCannotAssign) {
               ThrowsMessage<UsageError>(
                   "--shell: 'white' must be a thickness and a material, as in 0.5mm:white"));
   EXPECT_THAT(planned({"--shell", "0:white", "--core", "clear"}),
-              ThrowsMessage<UsageError>("--shell: '0:white' must be thicker than zero"));
+              ThrowsMessage<UsageError>("--shell: '0' is not accepted; the length must be greater "
+                                        "than 0 mm, up to 1000 mm"));
   EXPECT_THAT(planned({"--shell", "1:a=#000000", "--core", "a=#ffffff"}),
               ThrowsMessage<UsageError>("--core: 'a' has two colours"));
   EXPECT_THAT(planned({"--material", "pink"}),

@@ -40,9 +40,7 @@ class Measure : public testing::Test {
   void SetUp() override { save(test::boxMesh({0, 0, 0}, {2, 2, 1}), "part.stl"); }
 
   void save(const Mesh& mesh, const std::string& name) const {
-    const std::string bytes = test::binaryStl(mesh);
-    std::ofstream(scratch / name, std::ios::binary)
-        .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    scratch.write(name, test::binaryStl(mesh));
   }
   [[nodiscard]] std::string file(const std::string& name) const { return scratch / name; }
 
@@ -155,14 +153,18 @@ TEST_F(Measure, RefusesWhatCannotBeMeasured) {
     return [=] { Measuring(arguments)->plan(in); };
   };
   EXPECT_THAT(plan({file("part.stl")}),
-              ThrowsMessage<UsageError>(
-                  "--reference is missing: name the mesh that the surface should be"));
+              ThrowsMessage<UsageError>("'--reference' is missing; see --help"));
   EXPECT_THAT(plan({file("part.stl"), "--reference", file("none.stl")}),
               ThrowsMessage<DataError>(HasSubstr("no such file")));
-  EXPECT_THAT(plan({file("part.stl"), "--reference", file("part.stl"), "--map", "map.stl"}),
-              ThrowsMessage<UsageError>("--map: 'map.stl' is no .ply, which alone holds colours"));
-  EXPECT_THAT(plan({file("part.stl"), "--reference", file("part.stl"), "--spacing", "0"}),
-              ThrowsMessage<UsageError>("--spacing: 0 mm is no length to look at"));
+  EXPECT_THAT(
+      plan({file("part.stl"), "--reference", file("part.stl"), "--map", "map.stl"}),
+      ThrowsMessage<UsageError>(HasSubstr("--map: 'map.stl' cannot hold colours; name a .ply")));
+  for (const char* spacing : {"0", "1e-5mm", "2m"}) {
+    EXPECT_THAT(plan({file("part.stl"), "--reference", file("part.stl"), "--spacing", spacing}),
+                ThrowsMessage<UsageError>("--spacing: '" + std::string(spacing) +
+                                          "' is not accepted; the length must be from 0.001 mm to "
+                                          "1000 mm"));
+  }
   EXPECT_THAT(
       plan({file("part.stl"), "--reference", file("part.stl"), "--report", file("part.stl")}),
       ThrowsMessage<UsageError>(HasSubstr("exists; --overwrite replaces it")));

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/mesh_files.h"
 #include "tests/support/shapes.h"
 #include "tests/support/told.h"
 #include "vdbdither/engine/operator.h"
@@ -23,11 +24,7 @@ using openvdb::Vec3d;
 using testing::HasSubstr;
 
 void writeObj(const std::filesystem::path& path, const Mesh& mesh) {
-  std::ofstream out(path);
-  out.precision(17);
-  for (const Vec3d& v : mesh.vertices) out << "v " << v.x() << ' ' << v.y() << ' ' << v.z() << '\n';
-  for (const Mesh::Triangle& t : mesh.triangles)
-    out << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+  std::ofstream(path) << test::objText(mesh);
 }
 
 class Mesh2Sdf : public testing::Test {
@@ -220,10 +217,23 @@ TEST_F(Mesh2Sdf, GuessesOnlyThoseOfSeveralFilesThatAreLoose) {
 TEST_F(Mesh2Sdf, RefusesWhatItCannotMean) {
   EXPECT_EQ(refusal<UsageError>({}),
             "give either --printer NAME (vdbdither printers lists them) or --pitch DX,DY,DZ");
-  EXPECT_EQ(refusal<UsageError>({"--pitch", "1,2"}),
-            "--pitch: '1,2' is not three lengths such as 42um,84um,22um");
-  EXPECT_EQ(refusal<UsageError>({"--pitch", "1,2,0"}),
-            "--pitch: '1,2,0' is not between 1 um and 10 mm in every axis");
+  for (const char* pitch : {"1,2", "1,2,0", "1,2,11", "0.9um"}) {
+    EXPECT_EQ(refusal<UsageError>({"--pitch", pitch}),
+              "--pitch: '" + std::string(pitch) +
+                  "' is not accepted; the value must be one length or three, separated by commas, "
+                  "each from 0.001 mm to 10 mm");
+  }
+  for (const char* band : {"0", "1001", "0.5.5", "."}) {
+    EXPECT_EQ(refusal<UsageError>({"--pitch", "0.1", "--band", band}),
+              "--band: '" + std::string(band) +
+                  "' is not accepted; the value must be a number greater than 0, up to 1000, or a "
+                  "length");
+  }
+  for (const char* band : {"-1", "0mm", "2m"}) {
+    EXPECT_EQ(refusal<UsageError>({"--pitch", "0.1", "--band", band}),
+              "--band: '" + std::string(band) +
+                  "' is not accepted; the length must be greater than 0 mm, up to 1000 mm");
+  }
   EXPECT_THAT(refusal<DataError>({"--pitch", "1um,1um,1um", "--unit", "m", "--scale", "1000"}),
               HasSubstr("more voxels than can be counted; check --unit and --scale"));
 }

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "ops/kernels/mesh/mesh_repair.h"
 #include "tests/support/drawn_grids.h"
@@ -59,8 +60,8 @@ const double ball_mm3 = 4 * std::numbers::pi / 3 * std::pow(0.6, 3);
 TEST(MeshExport, AGridsSurfaceReadsBackWithoutRepairsInEveryFormat) {
   const test::ScratchFolder scratch;
   for (const std::string grid : {"surface", "solid"}) {
-    for (const std::string extension : {".stl", ".obj", ".ply"}) {
-      const std::string path = scratch / (grid + extension);
+    for (const MeshFormat* format : meshFormats()) {
+      const std::string path = scratch / (grid + std::string(format->ending));
       Export({path, "--grid", grid}).run(ball());
       const Mesh mesh = readWhole(path);
       EXPECT_EQ(test::eulerCharacteristic(mesh), 2) << path;

@@ -93,7 +93,7 @@ TEST_F(OffsetMap, RefusesHalfAnOrder) {
   EXPECT_THAT(planning(schema, {}),
               ThrowsMessage<UsageError>("give an offset: --by, --map or --grid"));
   EXPECT_THAT(planning(schema, {"--map", map()}),
-              ThrowsMessage<UsageError>("--map needs --height, in mm"));
+              ThrowsMessage<UsageError>("--map needs --height, which must not be 0 mm"));
   EXPECT_THAT(planning(schema, {"--grid", "heights"}),
               ThrowsMessage<UsageError>("--grid and --most go together; give both"));
   EXPECT_THAT(planning(schema, {"--by", "0.1", "--most", "0.1"}),
@@ -103,7 +103,8 @@ TEST_F(OffsetMap, RefusesHalfAnOrder) {
   EXPECT_THAT(planning(schema, {"--map", "nowhere.png", "--height", "1"}),
               ThrowsMessage<UsageError>("--map: no such file 'nowhere.png'"));
   EXPECT_THAT(planning(schema, {"--by", "0.1", "--pixel", "-1"}),
-              ThrowsMessage<UsageError>("--pixel: is below zero"));
+              ThrowsMessage<UsageError>("--pixel: '-1' is not accepted; the length must be "
+                                        "greater than 0 mm, up to 1000000 mm"));
 }
 
 }  // namespace

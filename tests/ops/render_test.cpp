@@ -32,9 +32,7 @@ struct Rendering : test::SinkCalled {
 class Render : public testing::Test {
  protected:
   void SetUp() override {
-    const std::string bytes = test::binaryStl(test::boxMesh({0, 0, 0}, {2, 1, 1}));
-    std::ofstream(scratch / "part.stl", std::ios::binary)
-        .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    scratch.write("part.stl", test::binaryStl(test::boxMesh({0, 0, 0}, {2, 1, 1})));
   }
   [[nodiscard]] std::string file(const std::string& name) const { return scratch / name; }
 
@@ -105,9 +103,7 @@ TEST_F(Render, BlocksHaveNoSlopes) {
 }
 
 TEST_F(Render, AFrameMakesPicturesComparable) {
-  const std::string bytes = test::binaryStl(test::boxMesh({0.5, 0.25, 0}, {1, 0.75, 0.5}));
-  std::ofstream(scratch / "small.stl", std::ios::binary)
-      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  scratch.write("small.stl", test::binaryStl(test::boxMesh({0.5, 0.25, 0}, {1, 0.75, 0.5})));
   Rendering({file("part.stl"), file("part.png")}).run();
   Rendering({file("small.stl"), file("framed.png"), "--frame", file("part.stl")}).run();
   Rendering({file("small.stl"), file("own.png")}).run();
@@ -131,13 +127,15 @@ TEST_F(Render, RefusesWhatCannotBeDrawn) {
   };
   const std::string words = "name the picture to write, and before it at most one mesh to draw";
   EXPECT_THAT(plan({"a.stl", "b.stl", "c.png"}), ThrowsMessage<UsageError>(words));
-  EXPECT_THAT(plan({"a.stl", "b.jpg"}), ThrowsMessage<UsageError>("'b.jpg' is no .png or .exr"));
+  EXPECT_THAT(plan({"a.stl", "b.jpg"}), ThrowsMessage<UsageError>("'b.jpg' must end in .png or .exr"));
   EXPECT_THAT(plan({"a.stl", file("b.png"), "--blocks"}),
               ThrowsMessage<UsageError>("--blocks: a mesh has no voxels"));
   EXPECT_THAT(plan({"a.stl", "b.png", "--pixel", "0"}),
-              ThrowsMessage<UsageError>("--pixel: must be more than 0 mm"));
+              ThrowsMessage<UsageError>("--pixel: '0' is not accepted; the length must be "
+                                        "greater than 0 mm, up to 1000 mm"));
   EXPECT_THAT(plan({"a.stl", "b.png", "--distance", "0"}),
-              ThrowsMessage<UsageError>("--distance: must be more than 0 mm"));
+              ThrowsMessage<UsageError>("--distance: '0' is not accepted; the length must be "
+                                        "greater than 0 mm, up to 1000000 mm"));
   EXPECT_THAT(plan({"a.stl", file("b.png"), "--frame", file("none.stl")}),
               ThrowsMessage<DataError>(HasSubstr("no such file")));
   EXPECT_THAT(plan({file("b.png")}), ThrowsMessage<DataError>(HasSubstr("there is none")));

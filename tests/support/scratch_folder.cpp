@@ -1,6 +1,7 @@
 #include "tests/support/scratch_folder.h"
 
 #include <cstdlib>
+#include <fstream>
 #include <system_error>
 
 #include "tests/support/png_reader.h"
@@ -17,6 +18,11 @@ ScratchFolder::ScratchFolder() {
 ScratchFolder::~ScratchFolder() {
   std::error_code ignored;
   fs::remove_all(path_, ignored);
+}
+
+fs::path ScratchFolder::write(const std::string& name, std::string_view bytes) const {
+  std::ofstream(path_ / name, std::ios::binary) << bytes;
+  return path_ / name;
 }
 
 std::map<std::string, std::vector<std::uint8_t>> filesUnder(const fs::path& folder) {

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace vdbdither::test {
@@ -19,6 +20,9 @@ class ScratchFolder {
     return path_ / name;
   }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+  /// Writes the file `name`, which may lie in a folder that exists, and returns its path.
+  std::filesystem::path write(const std::string& name, std::string_view bytes) const;
 
  private:
   std::filesystem::path path_;

@@ -1,6 +1,8 @@
 #include "vdbdither/engine/chain.h"
 
+#include <algorithm>
 #include <cctype>
+#include <string>
 
 #include "vdbdither/model/errors.h"
 
@@ -25,35 +27,65 @@ std::vector<Step> parseChain(std::span<const std::string> words) {
   return steps;
 }
 
+namespace {
+
+/// What `\` and the characters behind it stand for in `$'...'`, which `at` is moved beyond.
+char unescaped(const std::string& line, std::size_t& at) {
+  const auto digit = [&](std::size_t place) {
+    const char c = place < line.size() ? line[place] : ' ';
+    return std::isxdigit(static_cast<unsigned char>(c)) != 0;
+  };
+  const char c = line[++at];
+  if (c == 'n') return '\n';
+  if (c == 't') return '\t';
+  if (c == 'r') return '\r';
+  if (c != 'x' || !digit(at + 1) || !digit(at + 2)) return c;
+  at += 2;
+  return static_cast<char>(std::stoi(line.substr(at - 1, 2), nullptr, 16));
+}
+
+}  // namespace
+
 std::vector<std::string> splitWords(const std::string& line) {
   std::vector<std::string> words;
   std::string word;
   bool in_word = false;
+  bool escapes = false;  // in a `$'...'`
   char quote = 0;
   const auto finish = [&] {
     if (in_word) words.push_back(word);
     word.clear();
     in_word = false;
   };
+  const auto isBlank = [&](std::size_t at) {
+    return at >= line.size() || std::isspace(static_cast<unsigned char>(line[at]));
+  };
   for (std::size_t at = 0; at < line.size(); ++at) {
     const char c = line[at];
+    const bool has_next = at + 1 < line.size();
     if (quote) {
       if (c == quote) {
         quote = 0;
+      } else if (c == '\\' && escapes && has_next) {
+        word += unescaped(line, at);
       } else {
-        word += c == '\\' && quote == '"' && at + 1 < line.size() ? line[++at] : c;
+        word += c == '\\' && quote == '"' && has_next ? line[++at] : c;
       }
-    } else if (c == '\'' || c == '"') {
-      quote = c;
+    } else if (c == '\'' || c == '"' || (c == '$' && has_next && line[at + 1] == '\'')) {
+      escapes = c == '$';
+      if (escapes) ++at;
+      quote = escapes ? '\'' : c;
       in_word = true;
-    } else if (c == '\\' && at + 1 < line.size()) {
+    } else if (c == '\\' && has_next) {
       word += line[++at];
       in_word = true;
     } else if (c == '|' || c == '!') {
       finish();
       words.emplace_back(1, c);
-    } else if (std::isspace(static_cast<unsigned char>(c))) {
+    } else if (isBlank(at)) {
       finish();
+    } else if (c == '#' && !in_word && isBlank(at + 1)) {
+      at = std::min(line.find('\n', at), line.size());
     } else {
       word += c;
       in_word = true;

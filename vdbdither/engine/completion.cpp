@@ -6,33 +6,23 @@ namespace vdbdither {
 
 namespace {
 
-/// What may follow an option, as shells want it.
-struct Values {
-  std::string words;      ///< the choices, or a command that prints them
-  bool printers = false;  ///< the installed printers
-  bool files = false;
-};
+constexpr const char* list_printers = "vdbdither printers 2>/dev/null | cut -d' ' -f1";
 
-Values valuesOf(const Option& option) {
-  Values values;
-  if (option.name == "printer") {
-    values.printers = values.files = true;
-    return values;
-  }
-  std::string word;
-  for (const char c : option.value + "|") {
-    if (c != '|') {
-      word += c;
-      continue;
-    }
-    // Capitals stand for something; what is written small is meant as it stands.
-    const bool literal = std::none_of(word.begin(), word.end(),
-                                      [](unsigned char letter) { return std::isupper(letter); });
-    if (literal && !word.empty()) values.words += (values.words.empty() ? "" : " ") + word;
-    if (word.find("FILE") != std::string::npos) values.files = true;
-    word.clear();
-  }
-  return values;
+bool takesValue(const Option& option) { return option.kind == Option::Kind::value; }
+
+/// The installed printers complete the option besides its words and files.
+bool takesPrinter(const Option& option) { return option.completion == Option::Completion::printer; }
+
+bool takesFile(const Option& option) {
+  return option.completion == Option::Completion::file || takesPrinter(option);
+}
+
+bool hasWords(const Option& option) { return !option.words.empty() || takesPrinter(option); }
+
+std::string wordsOf(const Option& option) {
+  std::string text;
+  for (const Word& word : option.words) text += (text.empty() ? "" : " ") + word.name;
+  return text;
 }
 
 std::vector<Option> optionsOf(const Page& page, const Page& common) {
@@ -106,14 +96,11 @@ std::string bashCompletion() {
     for (const Option& option : optionsOf(page, common)) {
       if (option.kind == Option::Kind::positional) continue;
       options += "--" + option.name + " ";
-      if (option.kind != Option::Kind::value) continue;
-      const Values values = valuesOf(option);
-      if (values.words.empty() && !values.printers) continue;
-      text +=
-          "    '" + page.name + " --" + option.name + "') COMPREPLY=($(compgen " +
-          (values.files ? "-f " : "") + "-W \"" +
-          (values.printers ? "$(vdbdither printers 2>/dev/null | cut -d' ' -f1)" : values.words) +
-          "\" -- \"$word\")); return ;;\n";
+      if (!takesValue(option) || !hasWords(option)) continue;
+      text += "    '" + page.name + " --" + option.name + "') COMPREPLY=($(compgen " +
+              (takesFile(option) ? "-f " : "") + "-W \"" +
+              (takesPrinter(option) ? std::string("$(") + list_printers + ")" : wordsOf(option)) +
+              "\" -- \"$word\")); return ;;\n";
     }
     options.pop_back();
     options += "' -- \"$word\")) ;;\n";
@@ -141,6 +128,14 @@ std::string zshDescribed(const std::string& name, const std::string& meaning) {
   return "    " + quoted(safe + ":" + meaning) + "\n";
 }
 
+/// Offers the words of an option with what they do.
+std::string zshValues(const Option& option) {
+  if (takesPrinter(option)) return std::string("compadd -- ${(f)\"$(") + list_printers + ")\"}";
+  std::string text = "local -a values=(\n";
+  for (const Word& word : option.words) text += zshDescribed(word.name, word.meaning);
+  return text + "  ); _describe 'value' values";
+}
+
 std::string zshCompletion() {
   const Page common = commonPage();
   std::string text = zsh_head;
@@ -152,13 +147,9 @@ std::string zshCompletion() {
     for (const Option& option : optionsOf(page, common)) {
       if (option.kind == Option::Kind::positional) continue;
       options_of += zshDescribed("--" + option.name, option.help);
-      if (option.kind != Option::Kind::value) continue;
-      const Values values = valuesOf(option);
-      if (values.words.empty() && !values.printers) continue;
-      values_of += "  '" + page.name + " --" + option.name + "') compadd -- " +
-                   (values.printers ? "${(f)\"$(vdbdither printers 2>/dev/null | cut -d' ' -f1)\"}"
-                                    : values.words) +
-                   (values.files ? "; _files" : "") + "; return ;;\n";
+      if (!takesValue(option) || !hasWords(option)) continue;
+      values_of += "  '" + page.name + " --" + option.name + "') " + zshValues(option) +
+                   (takesFile(option) ? "; _files" : "") + "; return ;;\n";
     }
     options_of += "  ) ;;\n";
   }
@@ -189,13 +180,28 @@ end
 complete --command vdbdither --condition '__vdbdither_verb' --no-files
 )";
 
+/// In single quotes as fish takes it: backslashes keep their meaning before quotes.
+std::string fishQuoted(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) result += (c == '\'' || c == '\\' ? "\\" : "") + std::string(1, c);
+  return result + "'";
+}
+
+/// The words of an option, each with a tab and what it does.
+std::string fishValues(const Option& option) {
+  std::string text;
+  for (const Word& word : option.words)
+    text += (text.empty() ? "" : " ") + word.name + "\\t" + fishQuoted(word.meaning);
+  return text;
+}
+
 std::string fishCompletion() {
   const Page common = commonPage();
   std::string text = fish_head;
   const std::string begin = "complete --command vdbdither --condition ";
   for (const Page& page : pages()) {
     text += begin + "'__vdbdither_verb' --arguments " + page.name + " --description " +
-            quoted(page.summary) + "\n";
+            fishQuoted(page.summary) + "\n";
   }
   text += begin + "'__vdbdither_verb' --arguments 'run help'\n";
   for (const Page& page : pages()) {
@@ -203,13 +209,11 @@ std::string fishCompletion() {
       if (option.kind == Option::Kind::positional) continue;
       text += begin + "'__vdbdither_verb " + page.name + "' --long-option " + option.name;
       if (option.letter) text += std::string(" --short-option ") + option.letter;
-      if (option.kind == Option::Kind::value) {
-        const Values values = valuesOf(option);
-        text += values.files ? " --require-parameter" : " --exclusive";
-        if (values.printers) text += " --arguments '(vdbdither printers | string split -f1 \" \")'";
-        if (!values.words.empty()) text += " --arguments '" + values.words + "'";
-      }
-      text += " --description " + quoted(option.help) + "\n";
+      if (takesValue(option)) text += takesFile(option) ? " --require-parameter" : " --exclusive";
+      if (takesPrinter(option))
+        text += " --arguments '(vdbdither printers | string split -f1 \" \")'";
+      if (!option.words.empty()) text += " --arguments " + fishQuoted(fishValues(option));
+      text += " --description " + fishQuoted(option.help) + "\n";
     }
   }
   return text;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <sstream>
 
 #include "vdbdither/engine/registry.h"
 #include "vdbdither/engine/run_options.h"
@@ -22,9 +23,14 @@ std::string spelled(const Option& option) {
   if (option.kind == Option::Kind::positional) return option.name;
   std::string text;
   if (option.letter) text.append("-").append(1, option.letter).append(", ");
-  text.append("--").append(option.name);
-  if (option.kind == Option::Kind::value) text.append(" ").append(option.value);
+  text.append(option.shown());
+  if (option.kind == Option::Kind::value) text.append(" ").append(option.valueText());
   return text;
+}
+
+/// What an option is for, and which numbers it accepts.
+std::string meaning(const Option& option) {
+  return option.range.empty() ? option.help : option.help + " (" + option.range + ")";
 }
 
 std::string usage(const Page& page) {
@@ -41,7 +47,8 @@ std::string whatItIs(const Page& page) {
   if (page.kind == "source") return "A source: it makes layers and begins a chain.";
   if (page.kind == "filter") return "A filter: it changes the layers that pass through it.";
   if (page.kind == "sink")
-    return "A sink: it takes the layers that come to it. In mid-chain they pass on.";
+    return "A sink: it takes the layers that reach it, and passes them on in the middle of a "
+           "chain.";
   return "A command: it stands alone, in no chain.";
 }
 
@@ -50,7 +57,7 @@ std::string wrapped(const std::vector<std::string>& words, std::size_t indent) {
   std::string text;
   std::size_t column = indent;
   for (const std::string& word : words) {
-    if (column + 1 + word.size() > line_width) {
+    if (column > indent && column + 1 + word.size() > line_width) {
       text.append(1, '\n').append(indent, ' ');
       column = indent;
     }
@@ -60,6 +67,44 @@ std::string wrapped(const std::vector<std::string>& words, std::size_t indent) {
     }
     text += word;
     column += word.size();
+  }
+  return text;
+}
+
+/// The words of a sentence in lines of at most `line_width`, all indented alike.
+std::string wrapped(const std::string& sentence, std::size_t indent) {
+  std::vector<std::string> words;
+  std::istringstream stream(sentence);
+  for (std::string word; stream >> word;) words.push_back(word);
+  return wrapped(words, indent);
+}
+
+/// `text` and blanks up to a column; on a line of its own where it reaches the column.
+std::string upToColumn(const std::string& text, std::size_t column) {
+  if (text.size() + 1 < column) return text + std::string(column - text.size(), ' ');
+  return text + "\n" + std::string(column, ' ');
+}
+
+/// An option, its default and its words as lines of --help.
+std::string helpOf(const Option& option) {
+  constexpr std::size_t column = 30;
+  constexpr std::size_t word_column = column + 2;
+  std::string head = "  " + spelled(option);
+  if (!option.fallback.empty()) head += " [" + option.fallback + "]";
+  std::string text = upToColumn(head, column) + wrapped(meaning(option), column) + "\n";
+  for (const Word& word : option.words) {
+    text += std::string(word_column, ' ') +
+            wrapped(word.name + ": " + word.meaning, word_column + 2) + "\n";
+  }
+  return text;
+}
+
+std::string helpOf(const Options& options, Option::Kind kind, const Options& but) {
+  std::string text;
+  for (const Option& option : options.all()) {
+    const bool positional = option.kind == Option::Kind::positional;
+    if (positional == (kind == Option::Kind::positional) && !but.find(option.name))
+      text += helpOf(option);
   }
   return text;
 }
@@ -84,7 +129,10 @@ std::string markdownOptions(const Options& options) {
   for (const Option& option : options.all()) {
     text += "| `" + cell(spelled(option)) + "` | " +
             (option.fallback.empty() ? "" : "`" + cell(option.fallback) + "`") + " | " +
-            cell(option.help) + " |\n";
+            cell(meaning(option));
+    for (const Word& word : option.words)
+      text += "<br>`" + cell(word.name) + "`: " + cell(word.meaning);
+    text += " |\n";
   }
   return text;
 }
@@ -121,9 +169,14 @@ std::string troffOptions(const Options& options) {
   std::string text;
   for (const Option& option : options.all()) {
     text.append(".TP\n.B ").append(troff(spelled(option))).append("\n");
-    text.append(troff(option.help)).append(".");
+    text.append(troff(meaning(option))).append(".");
     if (!option.fallback.empty()) text += "\nDefault: " + troff(option.fallback) + ".";
     text += "\n";
+    if (option.words.empty()) continue;
+    text += ".RS\n";
+    for (const Word& word : option.words)
+      text += ".TP\n.B " + troff(word.name) + "\n" + troff(word.meaning) + ".\n";
+    text += ".RE\n";
   }
   return text;
 }
@@ -199,7 +252,14 @@ std::vector<Page> pages() {
 
 std::string helpText(const Page& page) {
   const Page common = page.kind == "tool" ? Page{} : commonPage();
-  return page.options.help(page.name, page.summary, page.example, common.options);
+  std::string text = page.summary + "\n\nUsage: " + usage(page) + "\n";
+  const auto addGroup = [&](const std::string& title, const std::string& lines) {
+    if (!lines.empty()) text += "\n" + title + ":\n" + lines;
+  };
+  addGroup("Arguments", helpOf(page.options, Option::Kind::positional, {}));
+  addGroup("Options", helpOf(page.options, Option::Kind::value, {}));
+  addGroup("Options of every operator", helpOf(common.options, Option::Kind::value, page.options));
+  return text + "\nExample:\n  vdbdither " + replaced(page.example, "\n", "\n  vdbdither ") + "\n";
 }
 
 std::string overview() {

@@ -1,148 +1,257 @@
 #include "vdbdither/engine/options.h"
 
-#include <algorithm>
-#include <array>
-#include <charconv>
+#include <cctype>
 #include <cmath>
-#include <memory>
-#include <numeric>
-
-#include <CLI/CLI.hpp>
+#include <type_traits>
 
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
+using openvdb::Coord;
+using openvdb::Vec3d;
+
 namespace {
 
-/// The whole of `text` as a finite number; throws UsageError saying that `wanted` was expected.
-double parseNumber(std::string_view text, const std::string& wanted) {
-  const std::string_view digits = text.starts_with('+') ? text.substr(1) : text;
-  double value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc() || end != digits.data() + digits.size() || !std::isfinite(value)) {
-    throw UsageError("'" + std::string(text) + "' is not " + wanted);
-  }
-  return value;
+using Texts = std::vector<std::string>;
+
+/// How values of a kind are read and written.
+template <typename T>
+struct Notation {
+  std::function<T(const std::string&)> parse;  ///< throws UsageError
+  std::function<std::string(const T&)> text;
+};
+
+std::string withRange(const std::string& noun, const std::string& range) {
+  return range.empty() ? noun : noun + " " + range;
 }
 
-std::string joined(std::span<const std::string> words, const char* separator) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : separator) + word;
-  return text;
+UsageError refusal(const std::string& text, const std::string& wanted) {
+  return UsageError("'" + text + "' is not accepted; the value must be " + wanted);
 }
 
-std::string quotedForShell(const std::string& word) {
-  const auto plain = [](char c) {
-    return std::isalnum(static_cast<unsigned char>(c)) || std::strchr("_-+=./,:@%", c);
-  };
-  if (!word.empty() && std::all_of(word.begin(), word.end(), plain)) return word;
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
+Notation<double> numbers(const Range& range) {
+  return {[range, wanted = withRange("a number", range.text())](const std::string& text) {
+            return parseNumber(text, range, wanted);
+          },
+          shortestText};
 }
 
-std::size_t editDistance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] != b[j - 1]);
-      diagonal = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, replaced}));
+Notation<int> wholeNumbers(const Range& range) {
+  return {[range, wanted = withRange("a whole number", range.text())](const std::string& text) {
+            const double value = parseNumber(text, range, wanted);
+            if (value != std::floor(value)) throw refusal(text, wanted);
+            return static_cast<int>(value);
+          },
+          [](int value) { return std::to_string(value); }};
+}
+
+Notation<double> lengthsInMm(const Range& range_mm) {
+  return {[range_mm](const std::string& text) { return parseLengthMm(text, range_mm); },
+          [](double mm) { return shortestText(mm) + "mm"; }};
+}
+
+/// Three values of a kind that is called `noun`, separated by commas, or one for all three.
+template <typename Vector>
+Notation<Vector> triples(const Notation<typename Vector::ValueType>& one, const std::string& noun,
+                         const std::string& range) {
+  const std::string wanted =
+      "one " + noun + " or three, separated by commas" + (range.empty() ? "" : ", each " + range);
+  return {[one, wanted](const std::string& text) {
+            const Texts words = commaList(text);
+            if (words.size() != 1 && words.size() != 3) throw refusal(text, wanted);
+            Vector values;
+            try {
+              for (int axis = 0; axis < 3; ++axis)
+                values[axis] = one.parse(words[static_cast<std::size_t>(axis) % words.size()]);
+            } catch (const UsageError&) {
+              throw refusal(text, wanted);
+            }
+            return values;
+          },
+          [one](const Vector& v) {
+            return one.text(v[0]) + "," + one.text(v[1]) + "," + one.text(v[2]);
+          }};
+}
+
+/// A text without an own notation; one that is empty is no value.
+Texts valueOf(const std::string& text) { return text.empty() ? Texts{} : Texts{text}; }
+
+std::string firstOf(const Texts& texts) { return texts.empty() ? "" : texts.front(); }
+
+template <typename T>
+void bind(Option& option, T& target, const Notation<T>& notation) {
+  option.set = [&target, notation](const std::string& text) { target = notation.parse(text); };
+  option.get = [&target, notation] { return Texts{notation.text(target)}; };
+  option.fallback = firstOf(option.get());
+}
+
+template <typename T>
+void bind(Option& option, std::optional<T>& target, const Notation<T>& notation,
+          const Word& empty) {
+  if (!empty.name.empty()) option.words = {empty};
+  option.set = [&target, notation, empty](const std::string& text) {
+    if (!empty.name.empty() && text == empty.name) {
+      target.reset();
+      return;
     }
-  }
-  return row.back();
-}
-
-std::string range(double min, double max) {
-  return std::isinf(max) ? "at least " + shortestText(min)
-                         : "between " + shortestText(min) + " and " + shortestText(max);
-}
-
-std::string cliName(const Option& option) {
-  if (option.kind == Option::Kind::positional) return option.name;
-  const std::string dashed = "--" + option.name;
-  return option.letter ? std::string("-") + option.letter + "," + dashed : dashed;
-}
-
-void addTo(CLI::App& app, const Option& option, const std::string& group) {
-  const auto set = [&option](const std::string& text) {
     try {
-      option.set(text);
+      target = notation.parse(text);
     } catch (const UsageError& error) {
-      const std::string shown =
-          option.kind == Option::Kind::positional ? option.name : "--" + option.name;
-      throw UsageError(shown + ": " + error.what());
+      throw empty.name.empty() ? error : UsageError(error.what() + (", or " + empty.name));
     }
   };
-  CLI::Option* added = nullptr;
-  if (option.kind == Option::Kind::flag) {
-    added = app.add_flag_callback(
-        cliName(option), [set] { set("true"); }, option.help);
-  } else if (option.repeated) {
-    added = app.add_option_function<std::vector<std::string>>(
-        cliName(option),
-        [set](const std::vector<std::string>& texts) {
-          for (const std::string& text : texts) set(text);
-        },
-        option.help);
-  } else {
-    added = app.add_option_function<std::string>(cliName(option), set, option.help);
+  option.get = [&target, notation, empty] {
+    return target ? Texts{notation.text(*target)} : valueOf(empty.name);
+  };
+  option.fallback = firstOf(option.get());
+}
+
+/// A word of a command line that was found to belong to an option.
+struct Given {
+  const Option* option;
+  std::string value;
+};
+
+/// Sorts the words of a command line by the options that they name.
+class ArgumentReader {
+ public:
+  ArgumentReader(const Options& own, const Options& common) : common_(common) {
+    for (const Option& option : own.all())
+      (option.kind == Option::Kind::positional ? positionals_ : named_).push_back(&option);
+    for (const Option& option : common.all()) {
+      if (!own.find(option.name)) named_.push_back(&option);
+    }
   }
-  added->group(group)->option_text(option.value +
-                                   (option.fallback.empty() ? "" : " [" + option.fallback + "]"));
-  if (option.kind == Option::Kind::value && option.repeated) {
-    added->allow_extra_args(false);
-  } else if (option.kind == Option::Kind::value) {
-    added->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+
+  /// Throws UsageError.
+  std::vector<Given> read(std::span<const std::string> words) {
+    rest_ = words;
+    bool options_ended = false;
+    while (!rest_.empty()) {
+      const std::string word = next();
+      if (options_ended || !word.starts_with('-') || word == "-") {
+        takePositional(word);
+      } else if (word == "--") {
+        options_ended = true;
+      } else if (word.starts_with("--")) {
+        takeName(word);
+      } else {
+        takeLetters(word);
+      }
+    }
+    return std::move(given_);
+  }
+
+ private:
+  std::string next() {
+    const std::string word = rest_.front();
+    rest_ = rest_.subspan(1);
+    return word;
+  }
+
+  [[nodiscard]] const Option* byName(const std::string& name) const {
+    const auto found = std::find_if(named_.begin(), named_.end(),
+                                    [&](const Option* option) { return option->name == name; });
+    return found == named_.end() ? nullptr : *found;
+  }
+
+  [[nodiscard]] const Option* byLetter(char letter) const {
+    const auto found = std::find_if(named_.begin(), named_.end(),
+                                    [&](const Option* option) { return option->letter == letter; });
+    return found == named_.end() ? nullptr : *found;
+  }
+
+  [[nodiscard]] bool isOption(const std::string& word) const {
+    if (word.starts_with("--")) return byName(word.substr(2, word.find('=') - 2));
+    return word.size() == 2 && word.front() == '-' && byLetter(word.back());
+  }
+
+  void takeValue(const Option& option) {
+    if (rest_.empty() || isOption(rest_.front())) {
+      const std::string call = option.shown() + " " + option.valueText();
+      throw UsageError(option.shown() + ": the value is missing; give " + call);
+    }
+    given_.push_back({&option, next()});
+  }
+
+  void takeName(const std::string& word) {
+    const std::size_t equals = word.find('=');
+    const Option* option = byName(word.substr(2, equals - 2));
+    if (!option) refuseUnknown(word.substr(0, equals));
+    const bool is_flag = option->kind == Option::Kind::flag;
+    if (equals != std::string::npos) {
+      if (is_flag) throw UsageError(option->shown() + ": takes no value; leave '=' out");
+      given_.push_back({option, word.substr(equals + 1)});
+    } else if (is_flag) {
+      given_.push_back({option, "true"});
+    } else {
+      takeValue(*option);
+    }
+  }
+
+  void takeLetters(const std::string& word) {
+    for (std::size_t at = 1; at < word.size(); ++at) {
+      const Option* option = byLetter(word[at]);
+      if (!option) refuseUnknown(word);
+      if (option->kind == Option::Kind::flag) {
+        given_.push_back({option, "true"});
+      } else if (at + 1 < word.size()) {
+        given_.push_back({option, word.substr(at + 1)});
+        return;
+      } else {
+        takeValue(*option);
+      }
+    }
+  }
+
+  void takePositional(const std::string& word) {
+    if (taken_positionals_ == positionals_.size()) {
+      const bool is_volume = word.ends_with(".vdb") && common_.find("input");
+      throw UsageError(
+          "'" + word + "' is not expected; " +
+          (is_volume ? "-i " + word + " reads it, -o " + word + " writes it" : "see --help"));
+    }
+    const Option* option = positionals_[taken_positionals_];
+    if (!option->repeated) ++taken_positionals_;
+    given_.push_back({option, word});
+  }
+
+  [[noreturn]] void refuseUnknown(const std::string& word) const {
+    Texts names;
+    for (const Option* option : named_) names.push_back(option->shown());
+    const std::string near = nearestWord(word, names);
+    throw UsageError("'" + word + "' is not an option; " +
+                     (near.empty() ? "see --help" : "did you mean '" + near + "'?"));
+  }
+
+  const Options& common_;
+  std::vector<const Option*> positionals_;
+  std::vector<const Option*> named_;
+  std::size_t taken_positionals_ = 0;
+  std::span<const std::string> rest_;
+  std::vector<Given> given_;
+};
+
+void take(const Given& given) {
+  try {
+    given.option->set(given.value);
+  } catch (const UsageError& error) {
+    throw UsageError(given.option->shown() + ": " + error.what());
   }
 }
 
 }  // namespace
 
-double parseLengthMm(std::string_view text) {
-  constexpr std::array<std::pair<std::string_view, double>, 7> units{{{"mm", 1.0},
-                                                                      {"um", 1e-3},
-                                                                      {"µm", 1e-3},
-                                                                      {"nm", 1e-6},
-                                                                      {"cm", 10.0},
-                                                                      {"in", 25.4},
-                                                                      {"m", 1000.0}}};
-  const std::string wanted = "a length such as 0.042mm, 42um or 600dpi";
-  if (text.ends_with("dpi")) {
-    const double dots = parseNumber(text.substr(0, text.size() - 3), wanted);
-    if (dots <= 0) throw UsageError("'" + std::string(text) + "' is not " + wanted);
-    return 25.4 / dots;
-  }
-  for (const auto& [unit, factor] : units) {
-    if (!text.ends_with(unit)) continue;
-    const double number = parseNumber(text.substr(0, text.size() - unit.size()), wanted);
-    // Dividing by a whole number rounds once: 42um is the double nearest to 0.042, as 0.042mm is.
-    return factor < 1 ? number / std::round(1 / factor) : number * factor;
-  }
-  return parseNumber(text, wanted);
+std::string Option::valueText() const {
+  std::string text;
+  for (const Word& word : words) text += (text.empty() ? "" : "|") + word.name;
+  return text + (text.empty() || value.empty() ? "" : "|") + value;
 }
 
-std::string shortestText(double value) {
-  std::array<char, 40> buffer{};
-  const auto result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
-  return {buffer.data(), result.ptr};
-}
-
-std::string nearestWord(std::string_view word, std::span<const std::string> candidates) {
-  std::string best;
-  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
-  for (const std::string& candidate : candidates) {
-    const std::size_t distance = editDistance(word, candidate);
-    if (distance < best_distance) {
-      best_distance = distance;
-      best = candidate;
-    }
-  }
-  return best;
-}
+std::string Option::shown() const { return (kind == Kind::positional ? "" : "--") + name; }
 
 Option& Options::add(std::string name, Option::Kind kind, std::string value, std::string help) {
   Option& option = options_.emplace_back();
@@ -155,113 +264,165 @@ Option& Options::add(std::string name, Option::Kind kind, std::string value, std
 
 void Options::flag(std::string name, bool& target, std::string help) {
   Option& option = add(std::move(name), Option::Kind::flag, "", std::move(help));
-  option.set = [&target](const std::string& text) { target = text == "true"; };
-  option.get = [&target] { return target ? "true" : ""; };
+  option.set = [&target](const std::string&) { target = true; };
+  option.get = [&target] { return target ? Texts{"true"} : Texts{}; };
 }
 
 void Options::text(std::string name, std::string& target, std::string value, std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
   option.fallback = target;
   option.set = [&target](const std::string& text) { target = text; };
-  option.get = [&target] { return target; };
+  // An empty text is a value only where it takes the place of another.
+  option.get = [&target, fallback = target] {
+    return fallback.empty() ? valueOf(target) : Texts{target};
+  };
 }
 
-void Options::texts(std::string name, std::vector<std::string>& targets, std::string value,
-                    std::string help) {
+void Options::file(std::string name, std::string& target, std::string value, std::string help) {
+  text(std::move(name), target, std::move(value), std::move(help));
+  completion(Option::Completion::file);
+}
+
+void Options::texts(std::string name, Texts& targets, std::string value, std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
   option.repeated = true;
   option.set = [&targets](const std::string& text) { targets.push_back(text); };
-  option.get = [&targets, option_name = option.name] {
-    std::vector<std::string> quoted;
-    std::transform(targets.begin(), targets.end(), std::back_inserter(quoted), quotedForShell);
-    const std::string between = " --" + option_name + " ";
-    return joined(quoted, between.c_str());
-  };
+  option.get = [&targets] { return targets; };
 }
 
-void Options::choice(std::string name, std::string& target, std::vector<std::string> choices,
-                     std::string help) {
-  text(std::move(name), target, joined(choices, "|"), std::move(help));
-  options_.back().set = [&target, choices = std::move(choices)](const std::string& text) {
-    if (std::find(choices.begin(), choices.end(), text) == choices.end()) {
-      throw UsageError("'" + text + "' is none of " + joined(choices, ", "));
-    }
-    target = text;
-  };
+void Options::text(std::string name, std::optional<std::string>& target, std::string value,
+                   std::string help, const Word& empty) {
+  const auto same = [](const std::string& text) { return text; };
+  bind(add(std::move(name), Option::Kind::value, std::move(value), std::move(help)), target,
+       {same, same}, empty);
 }
 
-void Options::integer(std::string name, int& target, int min, int max, std::string help) {
+void Options::integer(std::string name, int& target, Range range, std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, "N", std::move(help));
-  option.get = [&target] { return std::to_string(target); };
-  option.fallback = option.get();
-  option.set = [&target, min, max](const std::string& text) {
-    const bool bounded = max != std::numeric_limits<int>::max();
-    const std::string wanted =
-        "a whole number " + range(min, bounded ? max : std::numeric_limits<double>::infinity());
-    const double value = parseNumber(text, wanted);
-    if (value != std::floor(value) || value < min || value > max) {
-      throw UsageError("'" + text + "' is not " + wanted);
-    }
-    target = static_cast<int>(value);
-  };
+  option.range = range.text();
+  bind(option, target, wholeNumbers(range));
 }
 
-void Options::number(std::string name, double& target, double min, double max, std::string help) {
+void Options::integer(std::string name, std::optional<int>& target, Range range, std::string help,
+                      const Word& empty) {
+  Option& option = add(std::move(name), Option::Kind::value, "N", std::move(help));
+  option.range = range.text();
+  bind(option, target, wholeNumbers(range), empty);
+}
+
+void Options::number(std::string name, double& target, Range range, std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, "X", std::move(help));
-  option.get = [&target] { return shortestText(target); };
-  option.fallback = option.get();
-  option.set = [&target, min, max](const std::string& text) {
-    const std::string wanted = "a number " + range(min, max);
-    const double value = parseNumber(text, wanted);
-    if (value < min || value > max) throw UsageError("'" + text + "' is not " + wanted);
-    target = value;
-  };
+  option.range = range.text();
+  bind(option, target, numbers(range));
 }
 
-void Options::length(std::string name, double& target_mm, std::string help) {
+void Options::number(std::string name, std::optional<double>& target, Range range, std::string help,
+                     const Word& empty) {
+  Option& option = add(std::move(name), Option::Kind::value, "X", std::move(help));
+  option.range = range.text();
+  bind(option, target, numbers(range), empty);
+}
+
+void Options::length(std::string name, double& target_mm, Range range_mm, std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, "LENGTH", std::move(help));
-  option.get = [&target_mm] {
-    return target_mm == 0 ? std::string() : shortestText(target_mm) + "mm";
-  };
-  option.fallback = option.get();
-  option.set = [&target_mm](const std::string& text) { target_mm = parseLengthMm(text); };
+  option.range = range_mm.text("mm");
+  bind(option, target_mm, lengthsInMm(range_mm));
 }
 
-void Options::triple(std::string name, openvdb::Vec3d& target, std::string value,
+void Options::length(std::string name, std::optional<double>& target_mm, Range range_mm,
+                     std::string help, const Word& empty) {
+  Option& option = add(std::move(name), Option::Kind::value, "LENGTH", std::move(help));
+  option.range = range_mm.text("mm");
+  bind(option, target_mm, lengthsInMm(range_mm), empty);
+}
+
+void Options::triple(std::string name, Vec3d& target, std::string value, Range range,
                      std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
-  option.get = [&target] {
-    return shortestText(target[0]) + "," + shortestText(target[1]) + "," + shortestText(target[2]);
+  option.range = range.text();
+  bind(option, target, triples<Vec3d>(numbers(range), "number", range.text()));
+}
+
+void Options::triple(std::string name, Coord& target, std::string value, Range range,
+                     std::string help) {
+  Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
+  option.range = range.text();
+  bind(option, target, triples<Coord>(wholeNumbers(range), "whole number", range.text()));
+}
+
+void Options::lengths(std::string name, Vec3d& target_mm, std::string value, Range range_mm,
+                      std::string help) {
+  Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
+  option.range = range_mm.text("mm");
+  bind(option, target_mm, triples<Vec3d>(lengthsInMm(range_mm), "length", range_mm.text("mm")));
+}
+
+void Options::lengths(std::string name, std::optional<Vec3d>& target_mm, std::string value,
+                      Range range_mm, std::string help, const Word& empty) {
+  Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
+  option.range = range_mm.text("mm");
+  bind(option, target_mm, triples<Vec3d>(lengthsInMm(range_mm), "length", range_mm.text("mm")),
+       empty);
+}
+
+void Options::parsed(std::string name, std::string value,
+                     std::function<void(const std::string&)> set, std::function<std::string()> get,
+                     std::string help) {
+  Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
+  option.fallback = get();
+  option.set = std::move(set);
+  option.get = [get = std::move(get)] { return valueOf(get()); };
+}
+
+void Options::choice(std::string name, std::string& target, std::vector<Word> words,
+                     std::string help) {
+  const auto indexOf = [&target, words] {
+    const auto found = std::find_if(words.begin(), words.end(),
+                                    [&](const Word& word) { return word.name == target; });
+    return static_cast<std::size_t>(found - words.begin());
   };
-  option.fallback = option.get();
-  option.set = [&target](const std::string& text) {
-    const std::string wanted = "three numbers such as 0,45,90, or one for all three";
-    const std::vector<std::string> numbers = commaList(text);
-    if (numbers.size() != 1 && numbers.size() != 3)
-      throw UsageError("'" + text + "' is not " + wanted);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      target[static_cast<int>(axis)] = parseNumber(numbers[axis % numbers.size()], wanted);
+  addWords(
+      std::move(name), Option::Kind::value, words,
+      [&target, words](std::size_t index) { target = words[index].name; }, indexOf,
+      std::move(help));
+}
+
+void Options::addWords(std::string name, Option::Kind kind, std::vector<Word> words,
+                       std::function<void(std::size_t)> set, std::function<std::size_t()> get,
+                       std::string help) {
+  Option& option = add(std::move(name), kind, "", std::move(help));
+  option.words = words;
+  option.set = [words, set = std::move(set)](const std::string& text) {
+    for (std::size_t index = 0; index < words.size(); ++index) {
+      if (words[index].name == text) return set(index);
+    }
+    Texts names;
+    for (const Word& word : words) names.push_back(word.name);
+    throw UsageError("'" + text + "' is not accepted; choose " + alternatives(names));
   };
+  option.get = [words, get = std::move(get)] {
+    const std::size_t index = get();
+    return index < words.size() ? Texts{words[index].name} : Texts{};
+  };
+  option.fallback = firstOf(option.get());
 }
 
 void Options::positional(std::string name, std::string& target, std::string help, bool required) {
   Option& option = add(std::move(name), Option::Kind::positional, "", std::move(help));
   option.required = required;
+  option.completion = Option::Completion::file;
   option.fallback = target;
   option.set = [&target](const std::string& text) { target = text; };
-  option.get = [&target] { return target; };
+  option.get = [&target] { return valueOf(target); };
 }
 
-void Options::positionals(std::string name, std::vector<std::string>& targets, std::string help) {
+void Options::positionals(std::string name, Texts& targets, std::string help) {
   Option& option = add(std::move(name), Option::Kind::positional, "", std::move(help));
   option.required = true;
   option.repeated = true;
+  option.completion = Option::Completion::file;
   option.set = [&targets](const std::string& text) { targets.push_back(text); };
-  option.get = [&targets] {
-    std::vector<std::string> quoted;
-    std::transform(targets.begin(), targets.end(), std::back_inserter(quoted), quotedForShell);
-    return joined(quoted, " ");
-  };
+  option.get = [&targets] { return targets; };
 }
 
 const Option* Options::find(std::string_view name) const {
@@ -271,72 +432,47 @@ const Option* Options::find(std::string_view name) const {
 }
 
 void Options::parse(std::span<const std::string> arguments, const Options& common) const {
-  CLI::App app;
-  app.set_help_flag();
-  app.allow_extras();
-  std::vector<std::string> names;
-  const auto take = [&](const Option& option) {
-    addTo(app, option, "");
-    if (option.kind != Option::Kind::positional) names.push_back("--" + option.name);
-  };
-  for (const Option& option : options_) take(option);
-  for (const Option& option : common.options_) {
-    if (!find(option.name)) take(option);
+  std::vector<Given> all = ArgumentReader(*this, common).read(arguments);
+  std::stable_partition(all.begin(), all.end(),
+                        [](const Given& given) { return given.option->sets_others; });
+  for (const Given& given : all) take(given);
+  for (const Option& option : options_) {
+    const bool is_given = std::any_of(all.begin(), all.end(), [&](const Given& given) {
+      return given.option == &option && !given.value.empty();
+    });
+    if (option.required && !is_given)
+      throw UsageError("'" + option.shown() + "' is missing; see --help");
   }
-  try {
-    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
-  } catch (const CLI::ParseError& error) {
-    throw UsageError(error.what());
-  }
-  const std::vector<std::string> extras = app.remaining();
-  if (extras.empty()) {
-    for (const Option& option : options_) {
-      if (option.required && option.get().empty())
-        throw UsageError("no " + option.name + " is given; see --help");
-    }
-    return;
-  }
-  const std::string& extra = extras.front();
-  if (!extra.starts_with('-')) {
-    throw UsageError("unexpected argument '" + extra + "'; " +
-                     (extra.ends_with(".vdb") && common.find("input")
-                          ? "-i " + extra + " reads it, -o " + extra + " writes it"
-                          : "see --help"));
-  }
-  const std::string option_name = extra.substr(0, extra.find('='));
-  const std::string near = nearestWord(option_name, names);
-  throw UsageError("no option '" + option_name + "'; " +
-                   (near.empty() ? "see --help" : "did you mean '" + near + "'?"));
-}
-
-std::string Options::help(const std::string& verb, const std::string& summary,
-                          const std::string& example, const Options& common) const {
-  CLI::App app(summary, "vdbdither " + verb);
-  app.set_help_flag();
-  for (const Option& option : options_) addTo(app, option, "Options");
-  for (const Option& option : common.options_) {
-    if (!find(option.name)) addTo(app, option, "Options of every operator");
-  }
-  if (!example.empty()) {
-    std::string footer = "Example:\n  vdbdither ";
-    for (const char c : example)
-      footer += c == '\n' ? std::string("\n  vdbdither ") : std::string(1, c);
-    app.footer(footer);
-  }
-  app.get_formatter()->column_width(34);
-  return app.help();
 }
 
 std::string Options::canonical() const {
-  std::string text;
+  Texts words;
+  Texts last;  // positionals that look like options, and those behind them
+  const auto isDashed = [](const std::string& word) { return word.size() > 1 && word[0] == '-'; };
+  const auto isNegative = [&](const std::string& word) {
+    return isDashed(word) && std::isdigit(static_cast<unsigned char>(word[1])) != 0;
+  };
   for (const Option& option : options_) {
-    const std::string value = option.get();
-    if (value == option.fallback) continue;
-    if (option.kind != Option::Kind::positional) text += " --" + option.name;
-    if (option.kind != Option::Kind::flag)
-      text += " " + (option.repeated ? value : quotedForShell(value));
+    for (const std::string& value : option.get()) {
+      if (option.kind == Option::Kind::positional) {
+        const bool apart = !last.empty() || isDashed(value);
+        (apart ? last : words).push_back(quotedForShell(value));
+        continue;
+      }
+      words.push_back(option.shown());
+      if (option.kind == Option::Kind::flag) continue;
+      if (isDashed(value) && !isNegative(value)) {
+        words.back().append("=").append(quotedForShell(value));
+      } else {
+        words.push_back(quotedForShell(value));
+      }
+    }
   }
-  return text.empty() ? text : text.substr(1);
+  if (!last.empty()) words.emplace_back("--");
+  words.insert(words.end(), last.begin(), last.end());
+  std::string text;
+  for (const std::string& word : words) text.append(text.empty() ? "" : " ").append(word);
+  return text;
 }
 
 }  // namespace vdbdither

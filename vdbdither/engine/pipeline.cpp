@@ -14,6 +14,7 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "vdbdither/engine/history.h"
 #include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
@@ -157,12 +158,7 @@ class Pipeline::Stage : public Reporter {
         sink()->plan(in);
       }
     });
-    if (info_.transport || sink()) return;
-    std::string& history = out_.metadata[history_key];
-    if (!history.empty()) history += '\n';
-    history += name();
-    if (const std::string arguments = options_.canonical(); !arguments.empty())
-      history += ' ' + arguments;
+    if (!info_.transport && !sink()) addToHistory(out_, name(), options_);
   }
 
   void warn(const std::string& text) override { watcher->warn(name(), text); }

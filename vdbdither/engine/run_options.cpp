@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -11,28 +12,36 @@
 namespace vdbdither {
 
 void RunOptions::declare(Options& options) {
-  options.text("input", input, "FILE.vdb",
-               "Read this file instead of standard input, where the chain has no source");
+  options.file("input", input, "FILE.vdb",
+               "Reads this file instead of standard input, where the chain has no source");
   options.letter('i');
-  options.text("output", output, "FILE.vdb",
-               "Write this file instead of standard output, where the chain has no sink");
+  options.file("output", output, "FILE.vdb",
+               "Writes this file instead of standard output, where the chain has no sink");
   options.letter('o');
-  options.flag("overwrite", overwrite, "Replace an output that is already there");
-  options.integer("threads", threads, 0, 4096, "Threads to work with; 0 takes all");
-  options.text("slab", slab, "N|auto|all", "Layers worked on at a time, a multiple of 8");
-  options.text("memory", memory, "SIZE|auto",
-               "What the run may use, such as 4GiB; auto is most of what is free");
+  options.flag("overwrite", overwrite, "Replaces the output if it exists");
+  options.integer("threads", threads, {0, 4096}, "Number of threads; 0 takes all");
+  options.text("slab", slab, "N", "Number of layers worked on at a time, a multiple of 8");
+  options.words(
+      {{"auto", "As many as the memory allows, up to 64"}, {"all", "All layers at once"}});
+  options.parsed(
+      "memory", "SIZE",
+      [this](const std::string& text) {
+        if (text != "auto") parseBytes(text);
+        memory = text;
+      },
+      [this] { return memory; }, "Memory that the run may use, such as 4GiB");
+  options.words({{"auto", "Four fifths of the memory that is free"}});
   options.text("layers", layers, "A:B",
-               "Only the layers A to B-1, counted from the bottom of the job");
-  options.flag("stream", stream, "Refuse operators that need the whole volume at once");
-  options.flag("explain", explain, "Say what would be done, and at what cost, and stop");
-  options.flag("json", json, "Report time, voxels, bytes and peak memory of every stage as JSON");
-  options.flag("quiet", quiet, "No words but warnings and errors");
+               "Makes the layers A to B-1 only, counted from the bottom of the job");
+  options.flag("stream", stream, "Refuses operators that need the whole volume at once");
+  options.flag("explain", explain, "Prints what the run would do and cost, and stops");
+  options.flag("json", json, "Reports time, voxels, bytes and peak memory of each stage as JSON");
+  options.flag("quiet", quiet, "Prints only warnings and errors");
   options.letter('q');
-  options.flag("verbose", verbose, "One line for every stage");
+  options.flag("verbose", verbose, "Prints a line for each stage");
   options.letter('v');
-  options.flag("version", version, "Say which version this is");
-  options.flag("help", help, "This text");
+  options.flag("version", version, "Prints the version of the program");
+  options.flag("help", help, "Prints this text");
   options.letter('h');
 }
 
@@ -57,8 +66,8 @@ double parseBytes(const std::string& text) {
   for (const auto& [name, bytes] : byte_units) {
     if (unit == name) factor = bytes;
   }
-  if (error != std::errc() || factor == 0 || !(value > 0)) {
-    throw UsageError("--memory: '" + text + "' is not a size such as 4GiB or 500MB");
+  if (error != std::errc() || factor == 0 || !(value > 0) || !std::isfinite(value)) {
+    throw UsageError("'" + text + "' is not accepted; give a size such as 4GiB or 500MB, or auto");
   }
   return value * factor;
 }

@@ -22,18 +22,20 @@ std::string numberText(double value) {
 
 }  // namespace
 
-std::string chosenSurfaceGrid(std::span<const std::string> there, const std::string& wanted) {
+std::string chosenSurfaceGrid(std::span<const std::string> there,
+                              const std::optional<std::string>& wanted) {
   const auto isThere = [&](std::string_view name) {
     return std::find(there.begin(), there.end(), name) != there.end();
   };
-  std::string message = "no grid '" + wanted + "'; there is";
-  if (wanted == "auto") {
+  if (wanted && isThere(*wanted)) return *wanted;
+  if (!wanted) {
     for (const std::string_view name : surface_grids) {
       if (isThere(name)) return std::string(name);
     }
-    message = "no grid 'printed', 'solid', 'displaced' or 'surface'; there is";
   }
-  if (isThere(wanted)) return wanted;
+  std::string message =
+      "no grid " + (wanted ? "'" + *wanted + "'" : "'printed', 'solid', 'displaced' or 'surface'") +
+      "; there is";
   for (const std::string& name : there) message += " '" + name + "'";
   throw DataError(there.empty() ? message + " none" : message);
 }

@@ -17,9 +17,10 @@ namespace vdbdither {
 inline constexpr std::array<std::string_view, 4> surface_grids{printed_grid, solid_grid,
                                                                displaced_grid, surface_grid};
 
-/// `wanted` itself, or of "auto" the first of `surface_grids` that `there` holds. Throws DataError
-/// where it is not there.
-std::string chosenSurfaceGrid(std::span<const std::string> there, const std::string& wanted);
+/// `wanted`, or without it the first of `surface_grids` that `there` holds. Throws DataError where
+/// it is not there.
+std::string chosenSurfaceGrid(std::span<const std::string> there,
+                              const std::optional<std::string>& wanted);
 
 /// The surface that a grid stands for: of a bool grid its voxels, of a level set the level 0, of a
 /// fog volume (an occupancy) the level ½.

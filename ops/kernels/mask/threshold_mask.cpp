@@ -79,6 +79,10 @@ ThresholdMask ThresholdMask::whiteNoise(std::uint64_t seed) {
   return mask;
 }
 
+Coord ThresholdMask::size() const {
+  return values_.empty() ? Coord(0) : Coord(axes_[0].period, axes_[1].period, axes_[2].period);
+}
+
 float ThresholdMask::operator()(const Coord& ijk) const {
   if (values_.empty()) {
     std::uint64_t hash = mixed(seed_);

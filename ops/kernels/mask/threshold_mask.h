@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <openvdb/openvdb.h>
@@ -24,6 +25,11 @@ class ThresholdMask {
 
   /// The same threshold everywhere.
   static ThresholdMask constant(float value) { return {openvdb::Coord(1), {value}}; }
+
+  /// The period along each axis, and the thresholds of one period, z fastest; 0 and none of white
+  /// noise.
+  [[nodiscard]] openvdb::Coord size() const;
+  [[nodiscard]] std::span<const float> values() const { return values_; }
 
   [[nodiscard]] std::size_t bytes() const { return values_.size() * sizeof(float); }
 

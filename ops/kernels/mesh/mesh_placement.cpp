@@ -61,10 +61,4 @@ void place(Mesh& mesh, const MeshPlacement& placement) {
   for (Vec3d& vertex : mesh.vertices) vertex -= corner;
 }
 
-double unitMm(std::string_view unit) {
-  return std::find_if(units_mm.begin(), units_mm.end(),
-                      [&](const auto& known) { return known.first == unit; })
-      ->second;
-}
-
 }  // namespace vdbdither

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <array>
-#include <string_view>
-#include <utility>
 #include <vector>
 
 #include <openvdb/Types.h>
@@ -24,12 +21,5 @@ struct MeshPlacement {
 
 /// Turns, scales, then moves. Throws DataError where a mesh without extent is to fit.
 void place(Mesh& mesh, const MeshPlacement& placement);
-
-/// The units that a mesh's numbers can be in, and mm in each.
-inline constexpr std::array<std::pair<std::string_view, double>, 5> units_mm{
-    {{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}, {"in", 25.4}, {"um", 0.001}}};
-
-/// Mm in `unit`, one of them.
-double unitMm(std::string_view unit);
 
 }  // namespace vdbdither

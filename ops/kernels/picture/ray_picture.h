@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <string_view>
 #include <vector>
 
 #include <openvdb/Types.h>
@@ -42,7 +41,6 @@ enum class Look {
   sky,       ///< a dome, alike from everywhere above the horizon
   staircase  ///< a lamp of 10 cm, 1 m away and 10 degrees high, from the left, and some `sky`
 };
-inline constexpr std::array<std::string_view, 4> look_names{"area", "large", "sky", "staircase"};
 
 /// What a camera gets.
 struct RayPicture {

@@ -7,21 +7,28 @@
 
 #include <openvdb/Types.h>
 
-#include "vdbdither/model/mesh.h"
-
 namespace vdbdither {
 
 /// The content of a mesh file, and how its parser speaks of it: in single lines that start with its
 /// name.
 class MeshFile {
  public:
-  /// @param name   shown in messages; its extension settles what the content leaves open
+  /// @param name   shown in messages; its ending settles what the content leaves open
   /// @param bytes  must outlive the object
+  /// @param warn   called with each warning; may be empty
   MeshFile(std::string name, std::string_view bytes, std::function<void(const std::string&)> warn)
       : name_(std::move(name)), bytes_(bytes), warn_(std::move(warn)) {}
 
   [[nodiscard]] std::string_view bytes() const { return bytes_; }
-  [[nodiscard]] const std::string& name() const { return name_; }
+  /// The bytes without the byte order mark of UTF-8.
+  [[nodiscard]] std::string_view text() const;
+  /// The text without the white space at its beginning.
+  [[nodiscard]] std::string_view start() const;
+  /// Whether the first KiB holds no zero byte.
+  [[nodiscard]] bool isText() const;
+  /// Whether the name ends like this, case aside.
+  /// @param ending  lower case, with its dot
+  [[nodiscard]] bool isNamed(std::string_view ending) const;
 
   void warn(const std::string& what) const;
   void warnAtLine(const char* position, const std::string& what) const;
@@ -37,28 +44,13 @@ class MeshFile {
   std::function<void(const std::string&)> warn_;
 };
 
-/// `text` in single quotes, fit for one line of a terminal: unprintable bytes become '?', the end
-/// of a long text '...'.
+/// Returns `text` in single quotes, fit for one line of a terminal: unprintable bytes become '?',
+/// the end of a long text '...'.
 std::string inQuotes(std::string_view text);
 
-/// What a vertex that is not finite looks like in a message: "nan 0 -inf".
+/// Returns a vertex that is not finite as messages show it: "nan 0 -inf".
 std::string shown(const openvdb::Vec3d& position);
 
 bool isFinite(const openvdb::Vec3d& position);
-
-/// Recognizes the format of `file` and parses it; see readMesh.
-Mesh parseMesh(const MeshFile& file);
-
-/// Whether the size is exactly that of a binary STL with as many triangles as its header announces.
-bool hasSizeOfBinaryStl(std::string_view bytes);
-
-/// Whether the first statement is one of OBJ's, or there are only comments.
-bool looksLikeObj(std::string_view bytes);
-
-/// The parsers. What they return may have no triangles and unused vertices, all else is checked.
-Mesh parseBinaryStl(const MeshFile& file);
-Mesh parseAsciiStl(const MeshFile& file);
-Mesh parseObj(const MeshFile& file);
-Mesh parsePly(const MeshFile& file);
 
 }  // namespace vdbdither

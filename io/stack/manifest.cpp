@@ -1,0 +1,111 @@
+#include "io/stack/manifest.h"
+
+#include <nlohmann/json.hpp>
+
+#include "vdbdither/engine/version.h"
+#include "vdbdither/model/errors.h"
+
+namespace vdbdither {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+template <class Triple>
+ordered_json jsonOf(const Triple& triple) {
+  return ordered_json::array({triple[0], triple[1], triple[2]});
+}
+
+template <class Triple>
+Triple tripleOf(const ordered_json& json) {
+  Triple triple;
+  for (int axis = 0; axis < 3; ++axis) json.at(axis).get_to(triple[axis]);
+  return triple;
+}
+
+Manifest manifestOf(const ordered_json& json) {
+  Manifest manifest;
+  manifest.lattice.pitch_mm = tripleOf<openvdb::Vec3d>(json.at("pitch_mm"));
+  manifest.lattice.origin_mm = tripleOf<openvdb::Vec3d>(json.at("origin_mm"));
+  manifest.lattice.box = {tripleOf<openvdb::Coord>(json.at("box").at("min")),
+                          tripleOf<openvdb::Coord>(json.at("box").at("max"))};
+  manifest.format = json.at("format");
+  manifest.grid = json.value("grid", material_grid);
+  manifest.frame = {manifest.lattice.box, json.at("padding"), json.at("flip_x"), json.at("flip_y")};
+  manifest.layers.begin = json.at("first_layer");
+  manifest.layers.end = manifest.layers.begin + json.at("size").at(2).get<int>();
+  manifest.background = json.at("background");
+  for (const ordered_json& entry : json.at("materials"))
+    manifest.materials.push_back({entry.at("name"), entry.at("rgba")});
+  if (!json.at("printer").is_null()) manifest.printer = json["printer"].dump();
+  for (const ordered_json& line : json.at("history"))
+    manifest.history.push_back(line.get<std::string>());
+  for (const ordered_json& entry : json.at("slices")) {
+    manifest.slices.push_back(
+        {entry.at("layer"), entry.at("file"), entry.at("sha256"), entry.value("material", "")});
+  }
+  return manifest;
+}
+
+}  // namespace
+
+std::string textOf(const Manifest& manifest) {
+  const SliceFrame& frame = manifest.frame;
+  const Lattice& lattice = manifest.lattice;
+  ordered_json json;
+  json["creator"] = std::string("vdbdither ") + version;
+  const ordered_json printer = ordered_json::parse(manifest.printer, nullptr, false);
+  json["printer"] = printer.is_discarded() ? ordered_json() : printer;
+  json["format"] = manifest.format;
+  json["grid"] = manifest.grid;
+  json["pitch_mm"] = jsonOf(lattice.pitch_mm);
+  json["origin_mm"] = jsonOf(lattice.origin_mm);
+  json["size"] = {frame.width(), frame.height(), manifest.layers.size()};
+  json["first_layer"] = manifest.layers.begin;
+  json["box"] = {{"min", jsonOf(lattice.box.min())}, {"max", jsonOf(lattice.box.max())}};
+  json["padding"] = frame.padding;
+  json["flip_x"] = frame.flip_x;
+  json["flip_y"] = frame.flip_y;
+  json["background"] = manifest.background;
+  json["materials"] = ordered_json::array();
+  for (std::size_t i = 0; i < manifest.materials.size(); ++i) {
+    const std::uint64_t voxels = manifest.voxels[i];
+    json["materials"].push_back(
+        {{"index", i + 1},
+         {"name", manifest.materials[i].name},
+         {"rgba", manifest.materials[i].rgba},
+         {"voxels", voxels},
+         {"ml", static_cast<double>(voxels) * lattice.pitch_mm.product() / 1000}});
+  }
+  json["history"] = manifest.history;
+  json["slices"] = ordered_json::array();
+  for (const Manifest::Slice& slice : manifest.slices) {
+    ordered_json entry = {{"layer", slice.layer}, {"file", slice.file}, {"sha256", slice.sha256}};
+    if (!slice.material.empty()) entry["material"] = slice.material;
+    json["slices"].push_back(std::move(entry));
+  }
+  return json.dump(1) + "\n";
+}
+
+Manifest readManifest(const StackInput& stack) {
+  const std::vector<std::uint8_t> bytes = stack.read(manifest_name);
+  const std::string shown = "'" + stack.shown(manifest_name) + "'";
+  Manifest manifest;
+  try {
+    manifest = manifestOf(ordered_json::parse(bytes.begin(), bytes.end()));
+  } catch (const ordered_json::exception& error) {
+    throw DataError(shown + " is not a manifest of slice-export: " + error.what());
+  }
+  const Lattice& lattice = manifest.lattice;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(lattice.pitch_mm[axis] > 0))
+      throw DataError(shown + ": pitch_mm is not above zero" + make_stack_again);
+  }
+  if (lattice.box.empty() || manifest.frame.padding < 0 || manifest.layers.empty() ||
+      intersection(manifest.layers, lattice.layers()) != manifest.layers) {
+    throw DataError(shown + ": box, padding and layers do not fit together" + make_stack_again);
+  }
+  return manifest;
+}
+
+}  // namespace vdbdither

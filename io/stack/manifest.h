@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "io/profile/material_table.h"
+#include "io/stack/slice_runs.h"
+#include "io/stack/stack_files.h"
+#include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/lattice.h"
+
+namespace vdbdither {
+
+/// What `manifest.json` says of a stack of slices.
+struct Manifest {
+  /// A file of the stack.
+  struct Slice {
+    int layer = 0;
+    std::string file;
+    std::string sha256;    ///< of its bytes, hexadecimal
+    std::string material;  ///< whose voxels it shows; empty: all
+  };
+
+  std::string format;                ///< name of a SliceFormat
+  std::string grid = material_grid;  ///< whose voxels the slices show
+  std::string printer;               ///< the profile as JSON, or empty
+  std::vector<std::string> history;  ///< one command line per step
+  Lattice lattice;                   ///< of the job
+  SliceFrame frame;                  ///< of every slice; its box is the lattice's
+  std::array<std::uint8_t, 4> background{};
+  MaterialTable materials;
+  std::vector<std::uint64_t> voxels;  ///< of each material; not read back
+  ZRange layers;                      ///< the ones that the stack holds
+  std::vector<Slice> slices;          ///< in rising layers
+};
+
+/// The end of a refusal that names the remedy.
+inline constexpr const char* make_stack_again = "; make the stack again with slice-export";
+
+/// Returns the text of `manifest.json`.
+std::string textOf(const Manifest& manifest);
+
+/// Reads the manifest of a stack. Throws DataError where it is missing or malformed, and where its
+/// lattice, frame and layers do not fit together.
+Manifest readManifest(const StackInput& stack);
+
+}  // namespace vdbdither

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "io/stack/slice_format.h"
+
+namespace vdbdither {
+
+/// Reads the slices of a stack back.
+class StackReader {
+ public:
+  /// @param path  the stack's folder, its manifest, or its zip archive
+  /// @param warn  called once where slices are not as their manifest describes them, from any
+  /// thread
+  /// Throws DataError where there is no stack, and where its slices are not all there.
+  StackReader(const std::filesystem::path& path, std::function<void(const std::string&)> warn);
+
+  [[nodiscard]] const Manifest& manifest() const { return manifest_; }
+  [[nodiscard]] const SliceFormat& format() const { return *format_; }
+
+  /// Returns the index of the material of every voxel of layer `z`; of a format that does not tell
+  /// materials apart 1 for each. Safe to call from many threads. Throws DataError.
+  [[nodiscard]] RunImage layer(int z) const;
+
+ private:
+  void checkFiles() const;
+  [[nodiscard]] std::map<std::uint32_t, std::uint32_t> meaningsOfPixels() const;
+  [[nodiscard]] const Manifest::Slice* find(int z, const std::string& material) const;
+  /// The names of the materials with files of their own, or one empty name.
+  [[nodiscard]] std::vector<std::string> filesOfLayer() const;
+  [[nodiscard]] RunImage read(const Manifest::Slice& slice) const;
+  void translate(RunImage& image) const;
+  [[nodiscard]] int numberOf(int z) const { return z - manifest_.lattice.box.min().z(); }
+
+  StackInput input_;
+  std::function<void(const std::string&)> warn_;
+  Manifest manifest_;
+  const SliceFormat* format_;
+  std::map<std::pair<int, std::string>, const Manifest::Slice*> slices_;
+  std::map<std::uint32_t, std::uint32_t> meanings_;  ///< of a pixel: the index of a material
+  mutable std::atomic<bool> warned_ = false;
+};
+
+}  // namespace vdbdither

@@ -1,0 +1,126 @@
+#include "io/stack/stack_writer.h"
+
+#include <numeric>
+#include <utility>
+
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
+
+#include "io/file/digest.h"
+#include "io/image/png_runs.h"
+#include "vdbdither/model/errors.h"
+
+namespace vdbdither {
+
+namespace {
+
+std::vector<std::uint32_t> displayColours(const MaterialTable& materials) {
+  std::vector<std::uint32_t> colours{0};
+  for (const Material& material : materials) colours.push_back(rgba(material.rgba));
+  return colours;
+}
+
+}  // namespace
+
+/// A layer on its way through the threads.
+struct StackWriter::Layer {
+  int z = 0;
+  RunImage image;
+  std::vector<SliceFile> files;
+  std::vector<std::string> sha256;    ///< of each of the files
+  std::vector<std::uint64_t> voxels;  ///< of each material
+};
+
+StackWriter::StackWriter(const std::filesystem::path& target, Manifest stack, SliceNames names,
+                         const SliceEncoder& encoder)
+    : stack_(std::move(stack)),
+      names_(std::move(names)),
+      encoder_(encoder),
+      output_(target),
+      preview_(stack_.lattice.pitch_mm, stack_.frame.width(), stack_.frame.height(),
+               stack_.lattice.layers(), displayColours(stack_.materials)) {
+  stack_.voxels.assign(stack_.materials.size(), 0);
+}
+
+void StackWriter::add(ZRange layers, std::vector<RunImage> images, const Grids& grids) {
+  // They are kept here, for TBB forgets what is on its way when one of the steps fails.
+  std::vector<Layer> all(images.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    all[i].z = layers.begin + static_cast<int>(i);
+    all[i].image = std::move(images[i]);
+  }
+  std::size_t next = 0;
+  const auto take = [&](tbb::flow_control& control) -> Layer* {
+    if (next < all.size()) return &all[next++];
+    control.stop();
+    return nullptr;
+  };
+  const auto encode_one = [&](Layer* layer) {
+    encode(*layer, grids);
+    return layer;
+  };
+  const auto store_one = [&](Layer* layer) {
+    store(*layer);
+    *layer = {};
+  };
+  tbb::parallel_pipeline(
+      std::size_t{2} * tbb::this_task_arena::max_concurrency(),
+      tbb::make_filter<void, Layer*>(tbb::filter_mode::serial_in_order, take) &
+          tbb::make_filter<Layer*, Layer*>(tbb::filter_mode::parallel, encode_one) &
+          tbb::make_filter<Layer*, void>(tbb::filter_mode::serial_in_order, store_one));
+}
+
+const Manifest& StackWriter::finish() {
+  encoder_.finish(stack_, preview_.picture(), output_);
+  output_.commit();
+  return stack_;
+}
+
+std::string StackWriter::nameOf(int z) const {
+  std::string number = std::to_string(names_.first + z - stack_.lattice.box.min().z());
+  if (number.size() < static_cast<std::size_t>(names_.digits))
+    number.insert(0, names_.digits - number.size(), '0');
+  return names_.prefix + number;
+}
+
+void StackWriter::encode(Layer& layer, const Grids& grids) const {
+  layer.voxels = countedVoxels(layer);
+  layer.files = encoder_.encode({layer.z, nameOf(layer.z), layer.image, grids});
+  for (const SliceFile& file : layer.files) layer.sha256.push_back(sha256Of(file.bytes));
+}
+
+std::vector<std::uint64_t> StackWriter::countedVoxels(const Layer& layer) const {
+  std::vector<std::uint64_t> voxels(stack_.materials.size(), 0);
+  for (std::uint32_t y = 0; y < layer.image.height; ++y) {
+    std::uint32_t begin = 0;
+    for (const Run& run : layer.image.row(y)) {
+      if (run.value > voxels.size()) {
+        throw DataError("layer " + std::to_string(layer.z) + " holds material " +
+                        std::to_string(static_cast<std::int32_t>(run.value)) +
+                        ", but the table of materials ends at " + std::to_string(voxels.size()));
+      }
+      if (run.value > 0) voxels[run.value - 1] += run.end - begin;
+      begin = run.end;
+    }
+  }
+  return voxels;
+}
+
+void StackWriter::store(Layer& layer) {
+  if (stack_.layers.empty()) stack_.layers = {layer.z, layer.z};
+  if (layer.z != stack_.layers.end) {
+    throw DataError("layers " + std::to_string(stack_.layers.end) + " to " +
+                    std::to_string(layer.z - 1) + " are missing");
+  }
+  ++stack_.layers.end;
+  for (std::size_t i = 0; i < layer.files.size(); ++i) {
+    const SliceFile& file = layer.files[i];
+    output_.write(file.name, file.bytes);
+    stack_.slices.push_back({layer.z, file.name, layer.sha256[i], file.material});
+  }
+  for (std::size_t i = 0; i < layer.voxels.size(); ++i) stack_.voxels[i] += layer.voxels[i];
+  preview_.add(layer.z, std::move(layer.image),
+               std::accumulate(layer.voxels.begin(), layer.voxels.end(), std::uint64_t{0}));
+}
+
+}  // namespace vdbdither

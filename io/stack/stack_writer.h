@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "io/stack/slice_format.h"
+#include "io/stack/stack_preview.h"
+
+namespace vdbdither {
+
+/// How the files of a layer are called: prefix and running number.
+struct SliceNames {
+  std::string prefix;
+  int digits = 1;  ///< of the number, with zeros in front
+  int first = 0;   ///< number of the lowest layer of the lattice
+};
+
+/// Writes a stack of slices, layer by layer. It exists under its name once it is complete.
+class StackWriter {
+ public:
+  /// @param stack    all but its layers, slices and voxels
+  /// @param encoder  planned with the same; must outlive the writer
+  /// Throws DataError.
+  StackWriter(const std::filesystem::path& target, Manifest stack, SliceNames names,
+              const SliceEncoder& encoder);
+
+  /// Adds layers, which follow on those before.
+  /// @param images  of each of the layers, the index of the material of each voxel
+  /// @param grids   the slab's
+  /// Throws DataError where a layer is missing, where a voxel's material is not in the table, and
+  /// where the disk is full.
+  void add(ZRange layers, std::vector<RunImage> images, const Grids& grids);
+
+  /// Completes the stack and gives it its name. Returns what its manifest says.
+  const Manifest& finish();
+
+ private:
+  struct Layer;
+
+  [[nodiscard]] std::string nameOf(int z) const;
+  void encode(Layer& layer, const Grids& grids) const;
+  [[nodiscard]] std::vector<std::uint64_t> countedVoxels(const Layer& layer) const;
+  void store(Layer& layer);
+
+  Manifest stack_;
+  SliceNames names_;
+  const SliceEncoder& encoder_;
+  StackOutput output_;
+  StackPreview preview_;
+};
+
+}  // namespace vdbdither

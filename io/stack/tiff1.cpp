@@ -1,0 +1,34 @@
+#include "io/image/tiff.h"
+#include "io/stack/slice_format.h"
+
+namespace vdbdither {
+
+namespace {
+
+/// 1 where `image` has this value, else 0.
+RunImage masked(RunImage image, std::uint32_t value) {
+  for (Run& run : image.runs) run.value = run.value == value ? 1 : 0;
+  return image;
+}
+
+class BitTiffSlices : public SliceEncoder {
+ public:
+  [[nodiscard]] std::vector<SliceFile> encode(const SliceLayer& layer) const override {
+    return forEachMaterial(layer, ".tif", [&](std::uint32_t material) {
+      return encodeTiff(masked(layer.image, material), {{}, pitchMm().x(), pitchMm().y()});
+    });
+  }
+};
+
+}  // namespace
+
+extern const SliceFormat tiff1;
+const SliceFormat tiff1{
+    .name = "tiff1",
+    .summary = "For each material a folder of slices with 1 bit per voxel",
+    .pixel = SlicePixel::one_material,
+    .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<BitTiffSlices>(); },
+    .decode = decodeTiff,
+    .bytes_per_leaf = 80};
+
+}  // namespace vdbdither
