@@ -165,6 +165,10 @@ class Measure : public Sink {
   [[nodiscard]] bool standsAlone() const override { return !file_.empty(); }
 
   void plan(const Schema& in) override {
+    if (placement_.on_bed && standsAlone())
+      throw UsageError(
+          "--place: the bed is a face of the lattice's voxels, and a mesh has no lattice; measure "
+          "a .vdb");
     if (!report_file_.empty())
       StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_.overwrite);
     if (!map_file_.empty()) {
@@ -250,7 +254,9 @@ class Measure : public Sink {
   void readReference() {
     Mesh mesh = readMesh(reference_file_, [this](const std::string& text) { report().warn(text); });
     const MeshPlacementOptions& given = placement_;
-    place(mesh, {given.rotate_degrees, given.mmPerUnit(), given.fit_mm.value_or(0), given.on_bed});
+    MeshPlacement placement{given.rotate_degrees, given.mmPerUnit(), given.fit_mm.value_or(0)};
+    if (given.on_bed) placement.corner_mm = bedCornerMm(lattice_);
+    place(mesh, placement);
     MeshRepairs repairs;
     mesh = repaired(std::move(mesh), repairs);
     if (mesh.triangles.empty())

@@ -51,17 +51,16 @@ class MeshToSdf : public Source {
     const Vec3d pitch_mm = targetPitchMm(target_, schema);
     held_band_mm_ = band_.leastMm(pitch_mm);
     Mesh mesh = readMeshes();
-    place(mesh, {placement_.rotate_degrees, placement_.mmPerUnit(), placement_.fit_mm.value_or(0),
-                 placement_.on_bed});
+    const double tie_mm = place(mesh, pitch_mm);
     questionSize(mesh, schema);
     const std::vector<Mesh> parts = closed(mesh);  // which a guess may make larger
     schema.lattice = latticeOfMesh(mesh, pitch_mm);
     const Lattice& lattice = schema.lattice;
     for (const Mesh& part : parts)
-      parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part));
+      parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part), tie_mm);
     const SwallowedWalls hidden = wallsOf(mesh);
     countLeaves(mesh, schema);
-    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, hidden);
+    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, hidden, tie_mm);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
@@ -90,6 +89,20 @@ class MeshToSdf : public Source {
   }
 
  private:
+  /// Brings the mesh to where it is printed. Returns what its file leaves open of a position, mm:
+  /// most files hold coordinates in single precision.
+  double place(Mesh& mesh, const Vec3d& pitch_mm) const {
+    constexpr double open = 0x1p-20;
+    const MeshBounds bounds = boundsOf(mesh);
+    double greatest = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      greatest = std::max({greatest, std::abs(bounds.min[axis]), std::abs(bounds.max[axis])});
+    MeshPlacement placement{placement_.rotate_degrees, placement_.mmPerUnit(),
+                            placement_.fit_mm.value_or(0)};
+    if (placement_.on_bed) placement.corner_mm = bedCornerMm({.pitch_mm = pitch_mm});
+    return open * greatest * vdbdither::place(mesh, placement);
+  }
+
   struct MeshSize {
     std::size_t vertices, triangles;
   };

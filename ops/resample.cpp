@@ -205,7 +205,7 @@ class Resample : public Source {
       throw DataError("grid '" + grid_name_ + "' has no surface: none of its values pass " +
                       shortestText(double{reading.level}) + "; check --kind and --level");
     if (!placement_.on_bed) return surface;
-    map.postTranslate(-surface->bounds().min);
+    map.postTranslate(bedCornerMm({.pitch_mm = pitch_mm}) - surface->bounds().min);
     return made(map);
   }
 

@@ -45,7 +45,9 @@ Mesh joined(std::vector<Mesh> meshes) {
   return all;
 }
 
-void place(Mesh& mesh, const MeshPlacement& placement) {
+Vec3d bedCornerMm(const Lattice& lattice) { return lattice.origin_mm - 0.5 * lattice.pitch_mm; }
+
+double place(Mesh& mesh, const MeshPlacement& placement) {
   double factor = placement.factor;
   rotate(mesh, placement.rotate_degrees);
   if (placement.fit_mm > 0) {
@@ -56,9 +58,11 @@ void place(Mesh& mesh, const MeshPlacement& placement) {
     factor = placement.fit_mm / longest;
   }
   for (Vec3d& vertex : mesh.vertices) vertex *= factor;
-  if (!placement.on_bed) return;
-  const Vec3d corner = boundsOf(mesh).min;
-  for (Vec3d& vertex : mesh.vertices) vertex -= corner;
+  if (placement.corner_mm) {
+    const Vec3d move_mm = *placement.corner_mm - boundsOf(mesh).min;
+    for (Vec3d& vertex : mesh.vertices) vertex += move_mm;
+  }
+  return factor;
 }
 
 }  // namespace vdbdither
