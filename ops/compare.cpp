@@ -19,27 +19,19 @@ namespace {
 using nlohmann::ordered_json;
 using openvdb::GridBase;
 
-/// Holds what comes against a second archive, slab by slab.
+/// Compares what comes with a second archive, slab by slab.
 class Compare : public Sink {
  public:
   void declare(Options& options) override {
-    options.positionals("file", paths_,
-                        "Two .vdb files or named pipes, or one to compare with the volume that "
-                        "reaches this step");
+    options.positional("file", path_, "The .vdb or named pipe to compare with");
     options.number("tolerance", tolerance_, {.min = 0}, "Maximum difference of equal values");
     grids_.declare(options);
     json_.declare(options);
   }
 
-  [[nodiscard]] std::string inputFile() const override {
-    if (paths_.size() > 2)
-      throw UsageError("file: two can be compared, not " + std::to_string(paths_.size()));
-    return paths_.size() > 1 ? paths_.front() : "";
-  }
-
   void plan(const Schema& in) override {
     schema_ = in;
-    other_ = std::make_unique<SlabReader>(paths_.back(), std::vector<std::string>());
+    other_ = std::make_unique<Other>(*this, path_);
     std::vector<std::string> names = grids_.list();
     if (names.empty()) {
       for (const Grids* grids : {&in.grids, &other_->schema().grids}) {
@@ -52,12 +44,14 @@ class Compare : public Sink {
     }
   }
 
-  [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
+  [[nodiscard]] std::vector<Input*> inputs() override { return {other_.get()}; }
 
   [[nodiscard]] std::optional<Work> work() const override {
     double us = 0;
     for (const auto& [name, finding] : findings_) {
-      if (finding.apart.empty()) us += 3 + 1e-3 * leafBytes(other_->schema().grids.at(name));
+      if (finding.apart.empty())
+        us += cost::compare_us_per_grid +
+              cost::compare_us_per_byte * leafBytes(other_->schema().grids.at(name));
     }
     return Work{.us_per_held_leaf = us};
   }
@@ -77,25 +71,31 @@ class Compare : public Sink {
     end_ = in.core.end;
   }
 
-  void drain() override {
-    if (end_ && *end_ == schema_.lattice.layers().end) {
-      const ZRange others = other_->schema().lattice.layers();
-      compare({}, {std::max(*end_, others.begin), others.end});
-    }
-    other_->drain();
-  }
-
   void finish() override {
     std::string summary;
     for (const auto& [name, finding] : findings_) {
       if (!finding.equal()) summary += (summary.empty() ? "" : "; ") + finding.text(name);
     }
     report().print(json_.json ? jsonText() : summary.empty() ? "equal\n" : "");
-    if (!summary.empty()) throw DataError("not equal to '" + paths_.back() + "': " + summary);
+    if (!summary.empty()) throw DataError("not equal to '" + path_ + "': " + summary);
   }
 
  private:
-  /// How a grid fares.
+  /// The second archive. The layers that it has above the last slab are compared while all pipes
+  /// are read to their end: one writer may feed this one and that of the chain.
+  class Other : public SlabReader {
+   public:
+    Other(Compare& compare, const std::string& path) : SlabReader(path, {}), compare_(compare) {}
+    void readToEnd() override {
+      compare_.compareAbove();
+      SlabReader::readToEnd();
+    }
+
+   private:
+    Compare& compare_;
+  };
+
+  /// The result for one grid.
   struct Finding {
     std::string apart;  ///< in words, where voxels cannot be compared
     GridDifference difference;
@@ -136,11 +136,18 @@ class Compare : public Sink {
     return found == grids.end() ? schema.grids.at(name) : found->second;
   }
 
+  /// What only the other has above the last layer of the job must be empty.
+  void compareAbove() {
+    if (!end_ || *end_ != schema_.lattice.layers().end) return;
+    const ZRange others = other_->schema().lattice.layers();
+    compare({}, {std::max(*end_, others.begin), others.end});
+  }
+
   void compare(const Grids& ours, ZRange layers) {
     if (layers.empty()) return;
     const ZRange others = other_->schema().lattice.layers();
     const ZRange asked = other_->isPipe() ? intersection(layers, others) : layers;
-    const Grids theirs = asked.empty() ? Grids() : other_->run(asked);
+    const Grids theirs = asked.empty() ? Grids() : other_->read(asked);
     for (auto& [name, finding] : findings_) {
       if (!finding.apart.empty()) continue;
       const GridConstPtr here = gridOf(name, ours, schema_);
@@ -172,12 +179,12 @@ class Compare : public Sink {
     return json.dump() + "\n";
   }
 
-  std::vector<std::string> paths_;
+  std::string path_;
   double tolerance_ = 0;
   GridListOption grids_;
   JsonOption json_;
   Schema schema_;
-  std::unique_ptr<SlabReader> other_;
+  std::unique_ptr<Other> other_;
   std::map<std::string, Finding> findings_;
   std::optional<int> end_;  ///< of the layers that came
 };
@@ -186,9 +193,12 @@ class Compare : public Sink {
 
 extern const OperatorInfo compare;
 const OperatorInfo compare{
-    "compare", "Whether two .vdb hold the same voxels, and where not; exits with 1 where not",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 -o surface.vdb\n"
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! compare surface.vdb",
-    [] { return std::unique_ptr<Operator>(std::make_unique<Compare>()); }};
+    .name = "compare",
+    .summary = "Whether two .vdb hold the same voxels, and where not; exits with 1 where not",
+    .example =
+        "mesh2sdf part.stl --printer mimaki-3duj-553 -o surface.vdb\n"
+        "mesh2sdf part.stl --printer mimaki-3duj-553 ! compare surface.vdb",
+    .make = []() -> std::unique_ptr<Operator> { return std::make_unique<Compare>(); },
+    .names_vdb = true};
 
 }  // namespace vdbdither

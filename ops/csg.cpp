@@ -60,13 +60,7 @@ class CsgOperator : public Filter {
 
     Schema out = withoutSurfaceExtras(in);
     out.grids[surface_grid] = emptyCombined(*surface, *empty_);
-    out.leaves_per_row += second.leaves_per_row;
-    if (in.leaves == 0 || second.leaves == 0) {
-      out.leaves = out.surface_leaves = 0;
-    } else {
-      out.leaves += second.leaves;
-      out.surface_leaves += second.surface_leaves;
-    }
+    out.footprint = in.footprint + second.footprint;
     if (operation_ == Csg::unite) {
       out.lattice.box.expand(second.lattice.box);
       planParts(in, second, path);
@@ -81,16 +75,15 @@ class CsgOperator : public Filter {
     return reads;
   }
 
-  [[nodiscard]] double memoryBytes() const override { return other_->memoryBytes(); }
+  [[nodiscard]] std::vector<Input*> inputs() override { return {other_.get()}; }
 
-  void drain() override { other_->drain(); }
-
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 14}; }
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_held_leaf = cost::csg_us};
+  }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
-    const ZRange there = intersection(in.core, other_->schema().lattice.layers());
-    const Grids second = there.empty() ? Grids{} : other_->run(there);
+    const Grids& second = in.inputs.at(0);
     const auto others =
         second.contains(surface_grid) ? findGrid<FloatGrid>(second, surface_grid) : empty_;
     Grids out{{surface_grid, combined(*surface, *others, operation_, in.core)}};

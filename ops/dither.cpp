@@ -128,8 +128,9 @@ class Dither : public Filter {
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    const double own_normals = has_normals_ || dither_.amplitude == 0 ? 0 : 3;
-    return Work{.us_per_leaf = (dither_.amplitude == 0 ? 2 : 6) + own_normals};
+    if (dither_.amplitude == 0) return Work{.us_per_surface_leaf = cost::dither_plain_us};
+    const double own_normals = has_normals_ ? 0 : cost::dither_own_normals_us;
+    return Work{.us_per_surface_leaf = cost::dither_us + own_normals};
   }
 
   [[nodiscard]] Grids run(const Slab& in) const override {

@@ -58,7 +58,9 @@ class Hollow : public Filter {
     return {{surface_grid, Reach::point()}};
   }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 6}; }
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_held_leaf = cost::hollow_us};
+  }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     return {{surface_grid, hollowed(*findGrid<FloatGrid>(in.grids, surface_grid), lattice_,

@@ -105,55 +105,16 @@ Takers takersOf(const GridBase& grid, const std::string& path, const std::string
   return takers;
 }
 
-/// Says what there is: grids, lattice, ranges, materials, history. Of a file that is no job's it
-/// says it grid by grid.
-class Info : public Sink {
+/// Describes the lattice, grids, value ranges, materials and history of a job.
+class Description {
  public:
-  void declare(Options& options) override {
-    options.positional("file", path_,
-                       "The .vdb to describe in place of the volume that reaches this step", false);
-    json_.declare(options);
+  explicit Description(const Schema& schema) : schema_(schema) {
+    for (const auto& [name, grid] : schema.grids) summaries_[name];
   }
 
-  [[nodiscard]] std::string inputFile() const override { return standsAlone() ? "" : path_; }
-
-  /// A file is looked into as it is: `read` would refuse one that is no job's.
-  [[nodiscard]] bool standsAlone() const override {
-    std::error_code none;
-    return std::filesystem::is_regular_file(path_, none);
-  }
-
-  void plan(const Schema& in) override {
-    if (standsAlone()) return;
-    schema_ = in;
-    for (const auto& [name, grid] : in.grids) summaries_[name];
-  }
-
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 2}; }
-
-  void write(const Slab& in) override {
-    for (auto& [name, summary] : summaries_) {
-      if (const auto found = in.grids.find(name); found != in.grids.end())
-        summary.add(gridSummary(*found->second));
-    }
-    layers_ += in.core.size();
-  }
-
-  void finish() override {
-    VdbContents contents;
-    if (standsAlone()) {
-      contents = readVdb(path_);
-      if (contents.grids.empty()) throw DataError("'" + path_ + "' holds no grid");
-      if (!isJob(contents.grids)) return tellGrids(contents.grids);
-      takeAll(contents);
-    }
-    report().print(json_.json ? jsonText() : plainText());
-  }
-
- private:
-  /// What would have come by slabs.
-  void takeAll(const VdbContents& contents) {
-    schema_ = schemaOf(contents, "'" + path_ + "'");
+  /// Of a whole file at `path`.
+  Description(const VdbContents& contents, const std::string& path)
+      : schema_(schemaOf(contents, "'" + path + "'")) {
     for (const auto& [name, grid] : contents.grids) summaries_[name] = gridSummary(*grid);
     layers_ = schema_.lattice.layers().size();
     if (const auto some = schema_.metadata.extract(layers_key)) {
@@ -163,7 +124,197 @@ class Info : public Sink {
     }
   }
 
+  void add(const Slab& slab) {
+    for (auto& [name, summary] : summaries_) {
+      if (const auto found = slab.grids.find(name); found != slab.grids.end())
+        summary.add(gridSummary(*found->second));
+    }
+    layers_ += slab.core.size();
+  }
+
+  [[nodiscard]] std::string json() const {
+    ordered_json all;
+    const Lattice& lattice = schema_.lattice;
+    all["lattice"] = {{"pitch_mm", triple(lattice.pitch_mm)},
+                      {"origin_mm", triple(lattice.origin_mm)}};
+    if (!lattice.box.empty()) {
+      all["lattice"]["min"] = triple(lattice.box.min());
+      all["lattice"]["max"] = triple(lattice.box.max());
+    }
+    all["layers"] = layers_;
+    all["grids"] = ordered_json::array();
+    for (const auto& [name, summary] : summaries_) {
+      all["grids"].push_back(gridJson(name, *schema_.grids.at(name), summary));
+    }
+    const ordered_json printer = ordered_json::parse(metadata(printer_key), nullptr, false);
+    if (!printer.is_discarded()) all["printer"] = printer;
+    all["history"] = history();
+    return all.dump() + "\n";
+  }
+
+  [[nodiscard]] std::string text() const {
+    std::ostringstream words;
+    const Lattice& lattice = schema_.lattice;
+    words << "lattice   " << tripleText(lattice.pitch_mm, " x ") << " mm";
+    if (lattice.origin_mm != openvdb::Vec3d(0.0))
+      words << " from " << tripleText(lattice.origin_mm) << " mm";
+    words << "\n";
+    if (!lattice.box.empty()) {
+      const openvdb::Vec3d size = lattice.box.dim().asVec3d();
+      words << "box       " << tripleText(size, " x ") << " voxels, "
+            << tripleText(size * lattice.pitch_mm, " x ") << " mm, from "
+            << tripleText(lattice.box.min()) << " to " << tripleText(lattice.box.max()) << "\n";
+      if (layers_ != lattice.layers().size()) words << "layers    " << layers_ << " of them\n";
+    }
+    if (const std::string printer = metadata(printer_key); !printer.empty()) {
+      const PrinterProfile profile = printerProfileFromJson(printer);
+      words << "printer   " << profile.name << ", " << profile.title << "\n";
+    }
+    for (const auto& [name, summary] : summaries_)
+      gridText(words, name, *schema_.grids.at(name), summary);
+    const char* head = "history   ";
+    for (const std::string& line : history()) {
+      words << head << line << "\n";
+      head = "          ";
+    }
+    return words.str();
+  }
+
+  [[nodiscard]] ordered_json gridJson(const std::string& name, const GridBase& grid,
+                                      const GridSummary& summary) const {
+    ordered_json entry = {{"name", name},
+                          {"type", grid.valueType()},
+                          {"class", className(grid)},
+                          {"active_voxels", summary.active_voxels},
+                          {"leaves", summary.leaves},
+                          {"leaf_bytes", summary.leaf_bytes}};
+    if (isVector(grid)) entry["vector_type"] = GridBase::vecTypeToString(grid.getVectorType());
+    if (summary.active_voxels > 0) {
+      entry["min"] = triple(summary.box.min());
+      entry["max"] = triple(summary.box.max());
+      if (hasRange(grid) && isVector(grid)) {
+        entry["least"] = triple(summary.least);
+        entry["greatest"] = triple(summary.greatest);
+      } else if (hasRange(grid)) {
+        entry["least"] = summary.least[0];
+        entry["greatest"] = summary.greatest[0];
+      }
+    }
+    if (name == material_grid) {
+      entry["materials"] = ordered_json::array();
+      for (const auto& [value, voxels] : summary.counts) {
+        entry["materials"].push_back(
+            {{"index", value}, {"name", materialName(value)}, {"voxels", voxels}});
+      }
+    }
+    return entry;
+  }
+
+  void gridText(std::ostringstream& text, const std::string& name, const GridBase& grid,
+                const GridSummary& summary) const {
+    text << name << std::string(name.size() < 9 ? 10 - name.size() : 1, ' ') << grid.valueType();
+    if (grid.getGridClass() != openvdb::GRID_UNKNOWN) text << ", " << className(grid);
+    if (isVector(grid) && grid.getVectorType() != openvdb::VEC_INVARIANT)
+      text << ", " << GridBase::vecTypeToString(grid.getVectorType());
+    text << ": " << summary.active_voxels << " voxels";
+    if (summary.active_voxels > 0) {
+      text << " from " << tripleText(summary.box.min()) << " to " << tripleText(summary.box.max());
+      if (hasRange(grid) && isVector(grid)) {
+        text << ", values (" << tripleText(summary.least) << ") to ("
+             << tripleText(summary.greatest) << ")";
+      } else if (hasRange(grid)) {
+        text << ", values " << shortText(summary.least[0]) << " to "
+             << shortText(summary.greatest[0]);
+      }
+    }
+    text << ", " << bytesText(static_cast<double>(summary.leaf_bytes));
+    if (isCarried(grid)) text << " in " << summary.leaves << " leaves";
+    text << "\n";
+    if (name != material_grid) return;
+    for (const auto& [value, voxels] : summary.counts) {
+      const std::string known = materialName(value);
+      text << "          " << value << " " << (known.empty() ? "(not in the table)" : known) << ": "
+           << voxels << " voxels\n";
+    }
+  }
+
+ private:
+  [[nodiscard]] std::string metadata(std::string_view key) const {
+    const auto found = schema_.metadata.find(key);
+    return found == schema_.metadata.end() ? "" : found->second;
+  }
+
+  /// What a value of the grid `material` is called; nothing where the table does not know.
+  [[nodiscard]] std::string materialName(std::int64_t value) const {
+    const std::string text = metadata(materials_key);
+    if (text.empty()) return "";
+    const MaterialTable table = materialTableFromJson(text);
+    return value >= 1 && value <= static_cast<std::int64_t>(table.size()) ? table[value - 1].name
+                                                                          : "";
+  }
+
+  [[nodiscard]] std::vector<std::string> history() const {
+    std::vector<std::string> lines;
+    std::istringstream text(metadata(history_key));
+    for (std::string line; std::getline(text, line);) lines.push_back(line);
+    return lines;
+  }
+
+  static std::string className(const GridBase& grid) {
+    return GridBase::gridClassToString(grid.getGridClass());
+  }
+
+  Schema schema_;
+  std::map<std::string, GridSummary> summaries_;
+  int layers_ = 0;
+};
+
+class Info : public Sink {
+ public:
+  void declare(Options& options) override { json_.declare(options); }
+
+  void plan(const Schema& in) override { description_.emplace(in); }
+
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_held_leaf = cost::info_us};
+  }
+
+  void write(const Slab& in) override { description_->add(in); }
+
+  void finish() override {
+    report().print(json_.json ? description_->json() : description_->text());
+  }
+
+ private:
+  JsonOption json_;
+  std::optional<Description> description_;
+};
+
+/// Describes a file as it is: grids that do not lie on one lattice, which `read` would refuse, one
+/// by one.
+class InfoFile : public Tool {
+ public:
+  static bool takes(const std::string& file) {
+    std::error_code none;
+    return std::filesystem::is_regular_file(file, none);
+  }
+
+  void declare(Options& options) override {
+    options.positional("file", path_, "The .vdb to describe, if there is no chain", false);
+    json_.declare(options);
+  }
+
+  void run() override {
+    const VdbContents contents = readVdb(path_);
+    if (contents.grids.empty()) throw DataError("'" + path_ + "' holds no grid");
+    if (!isJob(contents.grids)) return tellGrids(contents.grids);
+    const Description description(contents, path_);
+    report().print(json_.json ? description.json() : description.text());
+  }
+
+ private:
   void tellGrids(const Grids& grids) {
+    const Description none{Schema()};
     ordered_json json;
     std::ostringstream text;
     if (grids.size() > 1) text << "the grids lie on no common lattice; each by itself:\n";
@@ -177,8 +328,8 @@ class Info : public Sink {
         summary.box = grid->evalActiveVoxelBoundingBox();
         summary.leaf_bytes = grid->memUsage();
       }
-      ordered_json entry = gridJson(name, *grid, summary);
-      gridText(text, name, *grid, summary);
+      ordered_json entry = none.gridJson(name, *grid, summary);
+      none.gridText(text, name, *grid, summary);
       tellPlace(*grid, entry, text);
       const Takers takers = takersOf(*grid, path_, name);
       for (const std::string& command : takers.commands)
@@ -221,151 +372,21 @@ class Info : public Sink {
     }
   }
 
-  [[nodiscard]] std::string metadata(std::string_view key) const {
-    const auto found = schema_.metadata.find(key);
-    return found == schema_.metadata.end() ? "" : found->second;
-  }
-
-  /// What a value of the grid `material` is called; nothing where the table does not know.
-  [[nodiscard]] std::string materialName(std::int64_t value) const {
-    const std::string text = metadata(materials_key);
-    if (text.empty()) return "";
-    const MaterialTable table = materialTableFromJson(text);
-    return value >= 1 && value <= static_cast<std::int64_t>(table.size()) ? table[value - 1].name
-                                                                          : "";
-  }
-
-  [[nodiscard]] std::vector<std::string> history() const {
-    std::vector<std::string> lines;
-    std::istringstream text(metadata(history_key));
-    for (std::string line; std::getline(text, line);) lines.push_back(line);
-    return lines;
-  }
-
-  static std::string className(const GridBase& grid) {
-    return GridBase::gridClassToString(grid.getGridClass());
-  }
-
-  [[nodiscard]] std::string jsonText() const {
-    ordered_json json;
-    const Lattice& lattice = schema_.lattice;
-    json["lattice"] = {{"pitch_mm", triple(lattice.pitch_mm)},
-                       {"origin_mm", triple(lattice.origin_mm)}};
-    if (!lattice.box.empty()) {
-      json["lattice"]["min"] = triple(lattice.box.min());
-      json["lattice"]["max"] = triple(lattice.box.max());
-    }
-    json["layers"] = layers_;
-    json["grids"] = ordered_json::array();
-    for (const auto& [name, summary] : summaries_) {
-      json["grids"].push_back(gridJson(name, *schema_.grids.at(name), summary));
-    }
-    const ordered_json printer = ordered_json::parse(metadata(printer_key), nullptr, false);
-    if (!printer.is_discarded()) json["printer"] = printer;
-    json["history"] = history();
-    return json.dump() + "\n";
-  }
-
-  [[nodiscard]] ordered_json gridJson(const std::string& name, const GridBase& grid,
-                                      const GridSummary& summary) const {
-    ordered_json entry = {{"name", name},
-                          {"type", grid.valueType()},
-                          {"class", className(grid)},
-                          {"active_voxels", summary.active_voxels},
-                          {"leaves", summary.leaves},
-                          {"leaf_bytes", summary.leaf_bytes}};
-    if (isVector(grid)) entry["vector_type"] = GridBase::vecTypeToString(grid.getVectorType());
-    if (summary.active_voxels > 0) {
-      entry["min"] = triple(summary.box.min());
-      entry["max"] = triple(summary.box.max());
-      if (hasRange(grid) && isVector(grid)) {
-        entry["least"] = triple(summary.least);
-        entry["greatest"] = triple(summary.greatest);
-      } else if (hasRange(grid)) {
-        entry["least"] = summary.least[0];
-        entry["greatest"] = summary.greatest[0];
-      }
-    }
-    if (name == material_grid) {
-      entry["materials"] = ordered_json::array();
-      for (const auto& [value, voxels] : summary.counts) {
-        entry["materials"].push_back(
-            {{"index", value}, {"name", materialName(value)}, {"voxels", voxels}});
-      }
-    }
-    return entry;
-  }
-
-  [[nodiscard]] std::string plainText() const {
-    std::ostringstream text;
-    const Lattice& lattice = schema_.lattice;
-    text << "lattice   " << tripleText(lattice.pitch_mm, " x ") << " mm";
-    if (lattice.origin_mm != openvdb::Vec3d(0.0))
-      text << " from " << tripleText(lattice.origin_mm) << " mm";
-    text << "\n";
-    if (!lattice.box.empty()) {
-      const openvdb::Vec3d size = lattice.box.dim().asVec3d();
-      text << "box       " << tripleText(size, " x ") << " voxels, "
-           << tripleText(size * lattice.pitch_mm, " x ") << " mm, from "
-           << tripleText(lattice.box.min()) << " to " << tripleText(lattice.box.max()) << "\n";
-      if (layers_ != lattice.layers().size()) text << "layers    " << layers_ << " of them\n";
-    }
-    if (const std::string printer = metadata(printer_key); !printer.empty()) {
-      const PrinterProfile profile = printerProfileFromJson(printer);
-      text << "printer   " << profile.name << ", " << profile.title << "\n";
-    }
-    for (const auto& [name, summary] : summaries_)
-      gridText(text, name, *schema_.grids.at(name), summary);
-    const char* head = "history   ";
-    for (const std::string& line : history()) {
-      text << head << line << "\n";
-      head = "          ";
-    }
-    return text.str();
-  }
-
-  void gridText(std::ostringstream& text, const std::string& name, const GridBase& grid,
-                const GridSummary& summary) const {
-    text << name << std::string(name.size() < 9 ? 10 - name.size() : 1, ' ') << grid.valueType();
-    if (grid.getGridClass() != openvdb::GRID_UNKNOWN) text << ", " << className(grid);
-    if (isVector(grid) && grid.getVectorType() != openvdb::VEC_INVARIANT)
-      text << ", " << GridBase::vecTypeToString(grid.getVectorType());
-    text << ": " << summary.active_voxels << " voxels";
-    if (summary.active_voxels > 0) {
-      text << " from " << tripleText(summary.box.min()) << " to " << tripleText(summary.box.max());
-      if (hasRange(grid) && isVector(grid)) {
-        text << ", values (" << tripleText(summary.least) << ") to ("
-             << tripleText(summary.greatest) << ")";
-      } else if (hasRange(grid)) {
-        text << ", values " << shortText(summary.least[0]) << " to "
-             << shortText(summary.greatest[0]);
-      }
-    }
-    text << ", " << bytesText(static_cast<double>(summary.leaf_bytes));
-    if (isCarried(grid)) text << " in " << summary.leaves << " leaves";
-    text << "\n";
-    if (name != material_grid) return;
-    for (const auto& [value, voxels] : summary.counts) {
-      const std::string known = materialName(value);
-      text << "          " << value << " " << (known.empty() ? "(not in the table)" : known) << ": "
-           << voxels << " voxels\n";
-    }
-  }
-
   std::string path_;
   JsonOption json_;
-  Schema schema_;
-  std::map<std::string, GridSummary> summaries_;
-  int layers_ = 0;
 };
 
 }  // namespace
 
 extern const OperatorInfo info;
-const OperatorInfo info{"info",
-                        "Says what is in a .vdb or comes along: grids, ranges, materials, history",
-                        "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign ! "
-                        "write part.vdb ! info",
-                        [] { return std::unique_ptr<Operator>(std::make_unique<Info>()); }};
+const OperatorInfo info{
+    .name = "info",
+    .summary = "Says what is in a .vdb or comes along: grids, ranges, materials, history",
+    .example =
+        "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign ! "
+        "write part.vdb ! info",
+    .make = []() -> std::unique_ptr<Operator> { return std::make_unique<Info>(); },
+    .on_file = {.takes = InfoFile::takes,
+                .make = []() -> std::unique_ptr<Tool> { return std::make_unique<InfoFile>(); }}};
 
 }  // namespace vdbdither

@@ -39,7 +39,7 @@ class Interlace : public Filter {
         out.lattice.box.min().y() >>= 1;
         out.lattice.box.max().y() >>= 1;
       }
-      out.leaves_per_row /= 2;
+      out.footprint = in.footprint.scaled(0.5);
       out.grids.clear();
       plain_ = transformOf(out.lattice);
     } else {
@@ -53,7 +53,9 @@ class Interlace : public Filter {
     return {{surface_grid, Reach::point()}};
   }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 1.6}; }
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_held_leaf = cost::interlace_us};
+  }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);

@@ -86,8 +86,8 @@ class Mask : public Source {
     schema.lattice.box = openvdb::CoordBBox(Coord(0, 0, 0), size_.offsetBy(-1));
     schema.grids[mask_grid] = emptyGrid();
     const auto leaves = [](int voxels) { return (voxels + leaf_layers - 1) / leaf_layers; };
-    schema.leaves_per_row = leaves(size_.x()) * leaves(size_.y());
-    schema.leaves = schema.surface_leaves = schema.leaves_per_row * leaves(size_.z());
+    const double row = leaves(size_.x()) * leaves(size_.y());
+    schema.footprint = {row, row * leaves(size_.z()), row * leaves(size_.z())};
     return schema;
   }
 
@@ -99,10 +99,12 @@ class Mask : public Source {
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    if (kind_ == Kind::void_and_cluster)
-      return Work{.seconds = voidAndClusterSeconds(settings()) + 2e-8 * voxels()};
-    const double us_per_voxel = kind_ == Kind::gradient_noise ? 0.3 : 0.025;
-    return Work{.seconds = 1e-6 * us_per_voxel * voxels()};
+    const double search_seconds =
+        kind_ == Kind::void_and_cluster ? voidAndClusterSeconds(settings()) : 0;
+    const double us_per_voxel = kind_ == Kind::void_and_cluster ? cost::mask_void_and_cluster_us
+                                : kind_ == Kind::gradient_noise ? cost::mask_gradient_noise_us
+                                                                : cost::mask_us;
+    return Work{.seconds = search_seconds + 1e-6 * us_per_voxel * voxels()};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {

@@ -60,14 +60,15 @@ class MaskSpectrum : public Sink {
     const Coord size = box_.dim();
     const auto voxels = static_cast<double>(box_.volume());
     const double spectra = levels_ + 1;
-    const double transforms = 2.5e-9 * spectra * voxels * (size.x() + size.y() + size.z());
+    const double transforms_us =
+        cost::spectrum_us_per_transform * spectra * voxels * (size.x() + size.y() + size.z());
     // Half of the frequencies are looked at, the others mirror them; of a voxel plane in 13 copies.
     const auto projected = static_cast<double>(normalsOfHalfSphere(step_degrees_).size());
     const auto planes = static_cast<double>(normalsOfHalfSphere(plane_step_degrees_).size() +
                                             normalsNearAxes().size());
-    const double facets =
-        0.5e-9 * voxels * (projected * (8 + 0.8 * spectra) + planes * 13 * (8 + 0.8 * spectra));
-    return Work{.seconds = transforms + facets};
+    const double facets_us =
+        cost::spectrum_us_per_facet * voxels * (projected + 13 * planes) * (8 + 0.8 * spectra);
+    return Work{.seconds = 1e-6 * (transforms_us + facets_us)};
   }
 
   void write(const Slab& in) override {

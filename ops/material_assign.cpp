@@ -110,7 +110,8 @@ class MaterialAssign : public Filter {
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    return Work{.us_per_leaf = bands_.empty() ? 1.0 : 9.0};
+    return Work{.us_per_surface_leaf =
+                    bands_.empty() ? cost::material_us : cost::material_shell_us};
   }
 
   [[nodiscard]] Grids run(const Slab& in) const override {

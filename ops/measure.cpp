@@ -133,14 +133,10 @@ std::string plainText(const ordered_json& all) {
   return text;
 }
 
-/// How far a surface lies from the one it should be.
-class Measure : public Sink {
+/// Measures how far a surface, wherever it comes from, lies from the one it should be.
+class SurfaceMeasurement {
  public:
-  void declare(Options& options) override {
-    options.positional(
-        "mesh", file_,
-        "Mesh to measure in place of the volume that reaches this step: " + meshFormatNames(),
-        false);
+  void declare(Options& options) {
     options.file("reference", reference_file_, "FILE", "Mesh that the surface should be");
     options.required();
     placement_.declare(options, "the reference");
@@ -162,13 +158,13 @@ class Measure : public Sink {
     overwrite_.declare(options, "each file");
   }
 
-  [[nodiscard]] bool standsAlone() const override { return !file_.empty(); }
-
-  void plan(const Schema& in) override {
-    if (placement_.on_bed && standsAlone())
+  /// Makes every check that does not need the surface, and reads the reference.
+  /// `lattice`: the surface's, or null.
+  void begin(const Lattice* lattice, Reporter& reporter) {
+    if (placement_.on_bed && lattice == nullptr)
       throw UsageError(
-          "--place: the bed is a face of the lattice's voxels, and a mesh has no lattice; measure "
-          "a .vdb");
+          "--place: the bed is a face of a lattice's voxels, and a mesh has no lattice; measure a "
+          ".vdb");
     if (!report_file_.empty())
       StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_.overwrite);
     if (!map_file_.empty()) {
@@ -178,58 +174,40 @@ class Measure : public Sink {
                          colouredEndings() + " file");
       MeshWriter::check(map_file_, overwrite_.overwrite);
     }
-    if (!standsAlone()) {
-      std::vector<std::string> there;
-      for (const auto& [name, grid] : in.grids) there.push_back(name);
-      name_ = chosenSurfaceGrid(there, surface_grid_.grid);
-      lattice_ = in.lattice;
-      surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
-      components_.emplace(surface_->frame());
-    }
-    readReference();
+    readReference(lattice, reporter);
   }
 
-  [[nodiscard]] bool isBarrier() const override { return true; }
+  [[nodiscard]] const std::optional<std::string>& grid() const { return surface_grid_.grid; }
+  [[nodiscard]] bool smooths() const { return smoothing_.smoothing != Smoothing::none; }
 
-  [[nodiscard]] std::optional<Work> work() const override {
+  [[nodiscard]] Work work(const Lattice& lattice) const {
     // Triangles at the surface are about as long as the diagonal of a voxel's largest face.
-    const openvdb::Vec3d& pitch = lattice_.pitch_mm;
+    const openvdb::Vec3d& pitch = lattice.pitch_mm;
     const double side_mm =
         std::sqrt(pitch.lengthSqr() - std::pow(std::min({pitch.x(), pitch.y(), pitch.z()}), 2));
     const double cuts = side_mm > spacing_mm_ ? std::ceil(side_mm / spacing_mm_) : 0;
     const double points = 1 + 2 * cuts * cuts;  // for a vertex
-    const double smoothing = smooths() ? taubin().usPerVertex() : 0;
-    return Work{.us_per_leaf = GridSurface::vertices_per_leaf * (0.3 + 1.3 * points + smoothing),
-                .seconds = 2e-6 * static_cast<double>(reference_->mesh().triangles.size())};
+    const double smoothing = smooths() ? cost::smoothingUs(smoothing_.iterations) : 0;
+    const double vertex_us = cost::measure_us + cost::measure_us_per_point * points + smoothing;
+    const auto triangles = static_cast<double>(reference_->mesh().triangles.size());
+    return Work{.us_per_surface_leaf = GridSurface::vertices_per_leaf * vertex_us,
+                .seconds = 1e-6 * cost::measure_us_per_triangle * triangles};
   }
 
-  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
-    return std::vector<std::string>{name_};
-  }
-
-  void write(const Slab& in) override {
-    const GridConstPtr& grid = in.grids.at(name_);
-    for (const BitLayer& layer : surface_->insideOf(grid, in.core)) components_->add(layer);
-    take(surface_->add(grid, in.core));
-  }
-
-  void finish() override {
-    const auto progress = [this](double fraction) { report().progress(fraction); };
-    const auto warn = [this](const std::string& text) { report().warn(text); };
-    if (standsAlone()) {
-      mesh_ = readMesh(file_, warn);
-      if (smooths()) checkClosed();
-    } else {
-      take(surface_->finish());
-    }
-    if (mesh_.triangles.empty())
-      throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
-    if (smooths()) smooth(mesh_, taubin(), progress);
-    const SurfaceErrors errors = surfaceErrors(mesh_, *reference_, spacing_mm_, progress);
-    const ordered_json all = figures(errors);
+  /// Measures `mesh` and gives the figures out.
+  ///
+  /// \param of          the name of the surface in the report
+  /// \param lattice     of the voxels that the surface was made from, or null
+  /// \param components  their components, or null
+  void finish(Mesh mesh, const std::string& of, const Lattice* lattice, VoxelComponents* components,
+              Reporter& reporter) const {
+    const auto progress = [&](double fraction) { reporter.progress(fraction); };
+    if (smooths()) smooth(mesh, taubin(), progress);
+    const SurfaceErrors errors = surfaceErrors(mesh, *reference_, spacing_mm_, progress);
+    const ordered_json all = figures(errors, mesh, of, lattice, components);
     for (const char* name :
          {"bias_mm", "mean_mm", "rms_mm", "p50_mm", "p90_mm", "p95_mm", "p99_mm", "max_mm"})
-      report().count(name, all["area"][name].get<double>());
+      reporter.count(name, all["area"][name].get<double>());
     // Both files appear, or none.
     std::optional<StagedOutput> staged;
     if (!report_file_.empty()) {
@@ -238,24 +216,23 @@ class Measure : public Sink {
       writeFile(staged->path(), {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
                 report_file_);
     }
-    if (!map_file_.empty()) writeMap(errors, all["map_range_mm"].get<double>());
+    if (!map_file_.empty()) writeMap(mesh, errors, all["map_range_mm"].get<double>());
     if (staged) staged->commit();
     if (json_.json) {
-      report().print(all.dump(1) + "\n");
+      reporter.print(all.dump(1) + "\n");
     } else if (report_file_.empty()) {
-      report().print(plainText(all));
+      reporter.print(plainText(all));
     }
   }
 
  private:
-  [[nodiscard]] bool smooths() const { return smoothing_.smoothing != Smoothing::none; }
   [[nodiscard]] Taubin taubin() const { return {.iterations = smoothing_.iterations}; }
 
-  void readReference() {
-    Mesh mesh = readMesh(reference_file_, [this](const std::string& text) { report().warn(text); });
+  void readReference(const Lattice* lattice, Reporter& reporter) {
+    Mesh mesh = readMesh(reference_file_, [&](const std::string& text) { reporter.warn(text); });
     const MeshPlacementOptions& given = placement_;
     MeshPlacement placement{given.rotate_degrees, given.mmPerUnit(), given.fit_mm.value_or(0)};
-    if (given.on_bed) placement.corner_mm = bedCornerMm(lattice_);
+    if (given.on_bed) placement.corner_mm = bedCornerMm(*lattice);
     place(mesh, placement);
     MeshRepairs repairs;
     mesh = repaired(std::move(mesh), repairs);
@@ -263,30 +240,16 @@ class Measure : public Sink {
       throw DataError(
           "--reference: the mesh has no surface: all its triangles are degenerate or "
           "cancel");
-    for (const std::string& line : repairs.lines()) report().warn("--reference: " + line);
+    for (const std::string& line : repairs.lines()) reporter.warn("--reference: " + line);
     reference_.emplace(std::move(mesh));
   }
 
-  /// What smoothing makes of borders is nothing to measure.
-  void checkClosed() const {
-    MeshRepairs repairs;
-    repaired(mesh_, repairs);
-    const std::vector<std::string> lines = repairs.lines();
-    if (!lines.empty()) {
-      throw DataError("--smooth: '" + file_ + "' is no closed mesh (" + lines.front() +
-                      "); measure it as it is, or repair it first");
-    }
-  }
-
-  void take(const SurfacePiece& piece) {
-    mesh_.vertices.insert(mesh_.vertices.end(), piece.vertices.begin(), piece.vertices.end());
-    mesh_.triangles.insert(mesh_.triangles.end(), piece.triangles.begin(), piece.triangles.end());
-  }
-
-  [[nodiscard]] ordered_json figures(const SurfaceErrors& errors) {
+  [[nodiscard]] ordered_json figures(const SurfaceErrors& errors, const Mesh& mesh,
+                                     const std::string& of, const Lattice* lattice,
+                                     VoxelComponents* components) const {
     ordered_json all;
-    all["surface"] = json(mesh_);
-    all["surface"]["of"] = standsAlone() ? file_ : "grid " + name_;
+    all["surface"] = json(mesh);
+    all["surface"]["of"] = of;
     all["surface"]["smoothing"] = smooths() ? smoothing_.iterations : 0;
     all["reference"] = json(reference_->mesh());
     all["reference"]["of"] = reference_file_;
@@ -297,7 +260,7 @@ class Measure : public Sink {
     const ErrorStatistics by_area = statisticsByArea(errors);
     all["area"] = json(by_area);
     all["vertices"] = json(statisticsByVertex(errors));
-    const auto axes = axisErrors(errors, *reference_, standsAlone() ? nullptr : &lattice_);
+    const auto axes = axisErrors(errors, *reference_, lattice);
     for (std::size_t axis = 0; axis < 3; ++axis)
       all["axes"][std::string(1, static_cast<char>('x' + axis))] = json(axes[axis]);
     all["cutoff_mm"] = rules_.cutoff_mm;
@@ -305,8 +268,8 @@ class Measure : public Sink {
     all["facets"] = ordered_json::array();
     for (const FacetRoughness& facet : facetRoughness(errors, *reference_, rules_))
       all["facets"].push_back(json(facet));
-    if (components_) {
-      const VoxelComponents::Counts counts = components_->finish();
+    if (components) {
+      const VoxelComponents::Counts counts = components->finish();
       all["components"] = json(counts.components);
       all["cavities"] = json(counts.cavities);
     }
@@ -314,7 +277,7 @@ class Measure : public Sink {
     return all;
   }
 
-  void writeMap(const SurfaceErrors& errors, double range_mm) const {
+  void writeMap(const Mesh& mesh, const SurfaceErrors& errors, double range_mm) const {
     VertexExtras extras{true, true,
                         "quality is the error in mm; blue is -" + shortestText(range_mm) +
                             ", grey 0, red " + shortestText(range_mm)};
@@ -326,11 +289,10 @@ class Measure : public Sink {
       colours.push_back(divergingColour(range_mm > 0 ? error / range_mm : 0));
       qualities.push_back(static_cast<float>(error));
     }
-    writer.add(mesh_.vertices, mesh_.triangles, 0, colours, qualities);
+    writer.add(mesh.vertices, mesh.triangles, 0, colours, qualities);
     writer.commit();
   }
 
-  std::string file_;
   std::string reference_file_;
   MeshPlacementOptions placement_;
   SurfaceGridOption surface_grid_;
@@ -343,21 +305,104 @@ class Measure : public Sink {
   JsonOption json_;
   OverwriteOption overwrite_;
 
+  std::optional<ClosestPoints> reference_;
+};
+
+/// The surface of a grid.
+class Measure : public Sink {
+ public:
+  void declare(Options& options) override { measurement_.declare(options); }
+
+  void plan(const Schema& in) override {
+    std::vector<std::string> there;
+    for (const auto& [name, grid] : in.grids) there.push_back(name);
+    name_ = chosenSurfaceGrid(there, measurement_.grid());
+    lattice_ = in.lattice;
+    surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
+    components_.emplace(surface_->frame());
+    measurement_.begin(&lattice_, report());
+  }
+
+  [[nodiscard]] bool isBarrier() const override { return true; }
+
+  [[nodiscard]] std::optional<Work> work() const override { return measurement_.work(lattice_); }
+
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    return std::vector<std::string>{name_};
+  }
+
+  void write(const Slab& in) override {
+    const GridConstPtr& grid = in.grids.at(name_);
+    for (const BitLayer& layer : surface_->insideOf(grid, in.core)) components_->add(layer);
+    take(surface_->add(grid, in.core));
+  }
+
+  void finish() override {
+    take(surface_->finish());
+    if (mesh_.triangles.empty())
+      throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
+    measurement_.finish(std::move(mesh_), "grid " + name_, &lattice_, &*components_, report());
+  }
+
+ private:
+  void take(const SurfacePiece& piece) {
+    mesh_.vertices.insert(mesh_.vertices.end(), piece.vertices.begin(), piece.vertices.end());
+    mesh_.triangles.insert(mesh_.triangles.end(), piece.triangles.begin(), piece.triangles.end());
+  }
+
+  SurfaceMeasurement measurement_;
   std::string name_;
   Lattice lattice_;
   std::optional<GridSurface> surface_;
   std::optional<VoxelComponents> components_;
-  std::optional<ClosestPoints> reference_;
   Mesh mesh_;
+};
+
+/// The surface of a mesh file.
+class MeasureMesh : public Tool {
+ public:
+  static bool takes(const std::string& file) { return !file.ends_with(".vdb"); }
+
+  void declare(Options& options) override {
+    options.positional("mesh", file_,
+                       "A mesh to measure, if there is no chain: " + meshFormatNames(), false);
+    measurement_.declare(options);
+  }
+
+  void run() override {
+    measurement_.begin(nullptr, report());
+    Mesh mesh = readMesh(file_, [this](const std::string& text) { report().warn(text); });
+    if (measurement_.smooths()) checkClosed(mesh);
+    measurement_.finish(std::move(mesh), file_, nullptr, nullptr, report());
+  }
+
+ private:
+  /// Smoothing moves the border of an open mesh: measuring it would be meaningless.
+  void checkClosed(const Mesh& mesh) const {
+    MeshRepairs repairs;
+    repaired(mesh, repairs);
+    const std::vector<std::string> lines = repairs.lines();
+    if (!lines.empty()) {
+      throw DataError("--smooth: '" + file_ + "' is no closed mesh (" + lines.front() +
+                      "); measure it as it is, or repair it first");
+    }
+  }
+
+  std::string file_;
+  SurfaceMeasurement measurement_;
 };
 
 }  // namespace
 
 extern const OperatorInfo measure;
 const OperatorInfo measure{
-    "measure", "How far a surface, printed or simulated, lies from the mesh that it should be",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! measure --reference "
-    "part.stl --report error.json",
-    []() -> std::unique_ptr<Operator> { return std::make_unique<Measure>(); }};
+    .name = "measure",
+    .summary = "How far a surface, printed or simulated, lies from the mesh that it should be",
+    .example =
+        "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! measure "
+        "--reference part.stl --report error.json",
+    .make = []() -> std::unique_ptr<Operator> { return std::make_unique<Measure>(); },
+    .on_file = {.takes = MeasureMesh::takes,
+                .make = []() -> std::unique_ptr<Tool> { return std::make_unique<MeasureMesh>(); }}};
 
 }  // namespace vdbdither

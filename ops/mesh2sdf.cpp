@@ -73,8 +73,10 @@ class MeshToSdf : public Source {
 
   [[nodiscard]] std::optional<Work> work() const override {
     // Every leaf looks at the triangles near its nearest ones.
-    const double per_leaf =
-        2 + 1.2 * triangles_per_leaf_ + (extras_.normals ? 8 : 0) + (extras_.closest ? 2 : 0);
+    const double per_leaf = cost::mesh2sdf_us +
+                            cost::mesh2sdf_us_per_triangle * triangles_per_leaf_ +
+                            (extras_.normals ? cost::mesh2sdf_normals_us : 0) +
+                            (extras_.closest ? cost::mesh2sdf_closest_us : 0);
     const double fields = parts_.empty() ? 1 : 2;
     return Work{.us_per_held_leaf = fields * per_leaf};
   }
@@ -350,10 +352,10 @@ class MeshToSdf : public Source {
     }
     triangles_per_leaf_ =
         static_cast<double>(mesh.triangles.size()) / leavesWithin(0, area_mm2, across_mm3);
-    schema.leaves_per_row = *std::max_element(rows.begin(), rows.end());
-    schema.leaves = leavesWithin(band_mm, area_mm2, across_mm3);
-    schema.surface_leaves =
-        leavesWithin(std::min(band_mm, lattice.pitch_mm.length()), area_mm2, across_mm3);
+    const double diagonal_mm = lattice.pitch_mm.length();
+    schema.footprint = {*std::max_element(rows.begin(), rows.end()),
+                        leavesWithin(band_mm, area_mm2, across_mm3),
+                        leavesWithin(std::min(band_mm, diagonal_mm), area_mm2, across_mm3)};
   }
 
   [[nodiscard]] Grids gridsOf(const DistanceGrids& made) const {

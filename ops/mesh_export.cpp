@@ -34,13 +34,14 @@ class MeshExport : public Sink {
     name_ = chosenSurfaceGrid(there, surface_grid_.grid);
     surface_.emplace(in.lattice, *in.grids.at(name_), level_mm_);
     MeshWriter::check(file_, overwrite_.overwrite);
-    leaves_ = in.surface_leaves;
+    leaves_ = in.footprint.at_surface;
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
     const double writing = meshFormatNamedBy(file_)->us_per_vertex;
-    const double smoothing = smooths() ? taubin().usPerVertex() : 0;
-    return Work{.us_per_leaf = GridSurface::vertices_per_leaf * (0.1 + writing + smoothing)};
+    const double smoothing = smooths() ? cost::smoothingUs(smoothing_.iterations) : 0;
+    return Work{.us_per_surface_leaf =
+                    GridSurface::vertices_per_leaf * (cost::mesh_export_us + writing + smoothing)};
   }
 
   [[nodiscard]] OutputEstimate output() const override {

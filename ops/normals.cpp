@@ -29,7 +29,7 @@ class Normals : public Filter {
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    return Work{.us_per_held_leaf = given_ ? 0 : 4.7};
+    return Work{.us_per_held_leaf = given_ ? 0 : cost::normals_us};
   }
 
   [[nodiscard]] Grids run(const Slab& in) const override {

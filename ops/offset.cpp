@@ -83,7 +83,9 @@ class Offset : public Filter {
     return reads;
   }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 5.5}; }
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_held_leaf = cost::offset_us};
+  }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto heights = grid_.empty() ? nullptr : findGrid<FloatGrid>(in.grids, grid_);

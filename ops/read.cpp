@@ -10,8 +10,7 @@ namespace vdbdither {
 
 namespace {
 
-/// Slabs of a .vdb file, or frames of a pipe. Stands in at the head of a chain that begins without
-/// a source.
+/// Slabs of a .vdb file, or frames of a pipe. Begins every chain without another source.
 class ReadOperator : public Source {
  public:
   void declare(Options& options) override {
@@ -30,16 +29,14 @@ class ReadOperator : public Source {
   }
 
   [[nodiscard]] bool isBarrier() const override { return !reader_->isPipe(); }
-  [[nodiscard]] double memoryBytes() const override { return reader_->memoryBytes(); }
+  [[nodiscard]] std::vector<Input*> inputs() override { return {reader_.get()}; }
   [[nodiscard]] std::optional<Work> work() const override {
-    constexpr double us_per_byte = 1.4e-3;
     double bytes = 0;
     for (const auto& [name, grid] : reader_->schema().grids) bytes += leafBytes(grid);
-    return Work{.us_per_held_leaf = us_per_byte * bytes};
+    return Work{.us_per_held_leaf = cost::read_us_per_byte * bytes};
   }
 
-  [[nodiscard]] Grids run(ZRange core) const override { return reader_->run(core); }
-  void drain() override { reader_->drain(); }
+  [[nodiscard]] Grids run(ZRange core) const override { return reader_->read(core); }
 
  private:
   std::string path_;

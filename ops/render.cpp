@@ -48,13 +48,15 @@ std::uint8_t codedSrgb(double linear) {
   return static_cast<std::uint8_t>(std::lround(255 * coded));
 }
 
-class Render : public Sink {
+Mesh readMeshOf(const std::string& file, Reporter& reporter) {
+  return readMesh(file, [&](const std::string& text) { reporter.warn(text); });
+}
+
+/// Draws a surface, wherever it comes from, and writes the picture.
+class SurfacePicture {
  public:
-  void declare(Options& options) override {
-    options.positionals("files", files_,
-                        "The .png or .exr to write; before it, a mesh to draw in place of the "
-                        "volume that reaches this step: " +
-                            meshFormatNames());
+  void declare(Options& options) {
+    options.positional("picture", file_, "The .png or .exr to write");
     surface_grid_.declare(options);
     options.flag("blocks", blocks_, "Draws the voxels that are inside as blocks");
     options.choice("look", look_, looks, "Light");
@@ -76,90 +78,54 @@ class Render : public Sink {
     overwrite_.declare(options, "the picture");
   }
 
-  [[nodiscard]] bool standsAlone() const override { return files_.size() == 2; }
-
-  void plan(const Schema& in) override {
-    if (files_.size() > 2)
-      throw UsageError("name the picture to write, and before it at most one mesh to draw");
-    const std::string& picture = files_.back();
-    if (!picture.ends_with(".png") && !picture.ends_with(".exr"))
-      throw UsageError("'" + picture + "' must end in .png or .exr");
+  /// Makes every check that does not need the surface.
+  void begin(Reporter& reporter) {
+    if (!file_.ends_with(".png") && !file_.ends_with(".exr"))
+      throw UsageError("'" + file_ + "' must end in .png or .exr");
     camera_.pixel_mm = view_.pixel_mm;
     camera_.distance_mm = projection_ == Projection::perspective ? view_.distance_mm : 0;
-    StagedOutput::check(picture, StagedOutput::Kind::file, overwrite_.overwrite);
-    if (!frame_file_.empty()) frame(camera_, meshOf(frame_file_), margin_);
-    if (standsAlone()) {
-      if (blocks_) throw UsageError("--blocks: a mesh has no voxels");
-      return;
-    }
-    std::vector<std::string> there;
-    for (const auto& [name, grid] : in.grids) there.push_back(name);
-    name_ = chosenSurfaceGrid(there, surface_grid_.grid);
-    lattice_ = in.lattice;
-    surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
-    if (blocks_) faces_.emplace(in.lattice);
+    StagedOutput::check(file_, StagedOutput::Kind::file, overwrite_.overwrite);
+    if (!frame_file_.empty()) frame(camera_, readMeshOf(frame_file_, reporter), margin_);
   }
 
-  [[nodiscard]] bool isBarrier() const override { return true; }
+  [[nodiscard]] const std::optional<std::string>& grid() const { return surface_grid_.grid; }
+  [[nodiscard]] bool drawsBlocks() const { return blocks_; }
 
-  [[nodiscard]] std::optional<Work> work() const override {
-    const std::optional<double> pixels = drawnPixels();
+  [[nodiscard]] std::optional<Work> work(const Lattice& lattice) const {
+    const std::optional<double> pixels = drawnPixels(lattice);
     if (!pixels) return std::nullopt;
-    return Work{.us_per_leaf = 1.4 * GridSurface::vertices_per_leaf,
-                .seconds = 1.1e-6 * *pixels * samples_};
+    return Work{.us_per_surface_leaf = cost::render_us * GridSurface::vertices_per_leaf,
+                .seconds = 1e-6 * cost::render_us_per_ray * *pixels * samples_};
   }
 
-  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
-    return std::vector<std::string>{name_};
-  }
-
-  void write(const Slab& in) override {
-    const GridConstPtr& grid = in.grids.at(name_);
-    if (!faces_) return take(surface_->add(grid, in.core));
-    int z = in.core.begin;
-    for (BitLayer& layer : surface_->insideOf(grid, in.core))
-      take(faces_->add(std::move(layer), z++));
-  }
-
-  void finish() override {
-    if (standsAlone()) {
-      mesh_ = meshOf(files_.front());
-    } else {
-      take(faces_ ? faces_->finish() : surface_->finish());
-    }
-    if (mesh_.triangles.empty())
-      throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
-    if (frame_file_.empty()) frame(camera_, mesh_, margin_);
-    report().count("triangles", static_cast<double>(mesh_.triangles.size()));
-    const RayScene scene(mesh_);
-    mesh_ = {};
+  void finish(Mesh mesh, Reporter& reporter) {
+    if (frame_file_.empty()) frame(camera_, mesh, margin_);
+    reporter.count("triangles", static_cast<double>(mesh.triangles.size()));
+    const RayScene scene(mesh);
+    mesh = {};
     const RayPicture picture =
         scene.picture(camera_, look_, samples_, static_cast<std::uint32_t>(seed_),
-                      [this](double fraction) { report().progress(fraction); });
-    report().count("width", picture.width);
-    report().count("height", picture.height);
+                      [&](double fraction) { reporter.progress(fraction); });
+    reporter.count("width", picture.width);
+    reporter.count("height", picture.height);
     const double brightness = brightness_.value_or(brightnessOf(look_));
     const std::vector<std::uint8_t> bytes =
-        files_.back().ends_with(".exr") ? exrOf(picture, brightness) : pngOf(picture, brightness);
-    StagedOutput staged(files_.back(), StagedOutput::Kind::file);
-    writeFile(staged.path(), bytes, files_.back());
+        file_.ends_with(".exr") ? exrOf(picture, brightness) : pngOf(picture, brightness);
+    StagedOutput staged(file_, StagedOutput::Kind::file);
+    writeFile(staged.path(), bytes, file_);
     staged.commit();
   }
 
  private:
-  [[nodiscard]] Mesh meshOf(const std::string& file) const {
-    return readMesh(file, [this](const std::string& text) { report().warn(text); });
-  }
-
   /// About how many pixels show something; nothing where the picture may be refused.
-  [[nodiscard]] std::optional<double> drawnPixels() const {
+  [[nodiscard]] std::optional<double> drawnPixels(const Lattice& lattice) const {
     const auto pixels = [](const Camera& camera) { return 1.0 * camera.width * camera.height; };
     if (!frame_file_.empty()) return 0.55 * pixels(camera_);
     Mesh corners;
     for (int corner = 0; corner < 8; ++corner) {
-      openvdb::Vec3d at = lattice_.position(lattice_.box.min());
+      openvdb::Vec3d at = lattice.position(lattice.box.min());
       for (int axis = 0; axis < 3; ++axis) {
-        if ((corner >> axis & 1) != 0) at[axis] = lattice_.position(lattice_.box.max())[axis];
+        if ((corner >> axis & 1) != 0) at[axis] = lattice.position(lattice.box.max())[axis];
       }
       corners.vertices.push_back(at);
     }
@@ -170,11 +136,6 @@ class Render : public Sink {
       return std::nullopt;
     }
     return 0.35 * pixels(camera);
-  }
-
-  void take(const SurfacePiece& piece) {
-    mesh_.vertices.insert(mesh_.vertices.end(), piece.vertices.begin(), piece.vertices.end());
-    mesh_.triangles.insert(mesh_.triangles.end(), piece.triangles.begin(), piece.triangles.end());
   }
 
   static std::vector<std::uint8_t> pngOf(const RayPicture& picture, double brightness) {
@@ -205,7 +166,7 @@ class Render : public Sink {
         });
   }
 
-  std::vector<std::string> files_;
+  std::string file_;
   SurfaceGridOption surface_grid_;
   bool blocks_ = false;
   Look look_ = Look::area;
@@ -218,7 +179,53 @@ class Render : public Sink {
   int seed_ = 0;
   std::optional<double> brightness_;
   OverwriteOption overwrite_;
+};
 
+/// The surface of a grid, or its voxels.
+class Render : public Sink {
+ public:
+  void declare(Options& options) override { picture_.declare(options); }
+
+  void plan(const Schema& in) override {
+    std::vector<std::string> there;
+    for (const auto& [name, grid] : in.grids) there.push_back(name);
+    name_ = chosenSurfaceGrid(there, picture_.grid());
+    lattice_ = in.lattice;
+    surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
+    if (picture_.drawsBlocks()) faces_.emplace(in.lattice);
+    picture_.begin(report());
+  }
+
+  [[nodiscard]] bool isBarrier() const override { return true; }
+
+  [[nodiscard]] std::optional<Work> work() const override { return picture_.work(lattice_); }
+
+  [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    return std::vector<std::string>{name_};
+  }
+
+  void write(const Slab& in) override {
+    const GridConstPtr& grid = in.grids.at(name_);
+    if (!faces_) return take(surface_->add(grid, in.core));
+    int z = in.core.begin;
+    for (BitLayer& layer : surface_->insideOf(grid, in.core))
+      take(faces_->add(std::move(layer), z++));
+  }
+
+  void finish() override {
+    take(faces_ ? faces_->finish() : surface_->finish());
+    if (mesh_.triangles.empty())
+      throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
+    picture_.finish(std::move(mesh_), report());
+  }
+
+ private:
+  void take(const SurfacePiece& piece) {
+    mesh_.vertices.insert(mesh_.vertices.end(), piece.vertices.begin(), piece.vertices.end());
+    mesh_.triangles.insert(mesh_.triangles.end(), piece.triangles.begin(), piece.triangles.end());
+  }
+
+  SurfacePicture picture_;
   std::string name_;
   Lattice lattice_;
   std::optional<GridSurface> surface_;
@@ -226,13 +233,40 @@ class Render : public Sink {
   Mesh mesh_;
 };
 
+/// The surface of a mesh file.
+class RenderMesh : public Tool {
+ public:
+  static bool takes(const std::string& file) { return !file.ends_with(".vdb"); }
+
+  void declare(Options& options) override {
+    options.positional("mesh", file_, "A mesh to draw, if there is no chain: " + meshFormatNames(),
+                       false);
+    picture_.declare(options);
+  }
+
+  void run() override {
+    picture_.begin(report());
+    if (picture_.drawsBlocks()) throw UsageError("--blocks: a mesh has no voxels");
+    Mesh mesh = readMeshOf(file_, report());
+    picture_.finish(std::move(mesh), report());
+  }
+
+ private:
+  std::string file_;
+  SurfacePicture picture_;
+};
+
 }  // namespace
 
 extern const OperatorInfo render;
 const OperatorInfo render{
-    "render", "A picture of a surface, printed, simulated or meant, as the eye would see it",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! render print.png --frame "
-    "part.stl",
-    []() -> std::unique_ptr<Operator> { return std::make_unique<Render>(); }};
+    .name = "render",
+    .summary = "A picture of a surface, printed, simulated or meant, as the eye would see it",
+    .example =
+        "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! simulate ! render print.png "
+        "--frame part.stl",
+    .make = []() -> std::unique_ptr<Operator> { return std::make_unique<Render>(); },
+    .on_file = {.takes = RenderMesh::takes,
+                .make = []() -> std::unique_ptr<Tool> { return std::make_unique<RenderMesh>(); }}};
 
 }  // namespace vdbdither

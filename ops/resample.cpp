@@ -88,12 +88,12 @@ class Resample : public Source {
     const Band band{1, band_mm_.value_or(0)};
     schema.lattice =
         latticeAround(bounds.min, bounds.max, std::max(pitch_mm.length(), band.mm), pitch_mm);
-    schema.leaves = leavesOf(schema.lattice, band.greatestMm(pitch_mm));
-    schema.surface_leaves =
+    const double leaves = leavesOf(schema.lattice, band.greatestMm(pitch_mm));
+    const double at_surface =
         leavesOf(schema.lattice, std::min(band.greatestMm(pitch_mm), pitch_mm.length()));
-    // As if the surface were spread evenly over the layers but for a factor of two.
-    schema.leaves_per_row =
-        2 * schema.leaves / (schema.lattice.layers().size() / static_cast<double>(leaf_layers) + 1);
+    // The surface is taken to be spread evenly over the layers, but for a factor of two.
+    const double rows = schema.lattice.layers().size() / static_cast<double>(leaf_layers) + 1;
+    schema.footprint = {2 * leaves / rows, leaves, at_surface};
     held_band_mm_ = band.leastMm(pitch_mm);
     field_ = std::make_unique<ZeroSetDistance>(surface_, schema.lattice, band, slack_mm_);
     const int bottom = schema.lattice.layers().begin;
@@ -103,7 +103,9 @@ class Resample : public Source {
 
   [[nodiscard]] double memoryBytes() const override { return surface_->memoryBytes(); }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_held_leaf = 400}; }
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_held_leaf = cost::resample_us};
+  }
 
   [[nodiscard]] Grids run(ZRange core) const override {
     const FloatGrid::Ptr surface = field_->run(core);

@@ -45,7 +45,9 @@ class Simulate : public Filter {
     return {{solid_grid, Reach::stencil(spread_->reach().z())}};
   }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 42}; }
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_surface_leaf = cost::simulate_us};
+  }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     return {{printed_grid, spread_->run(*findGrid<openvdb::BoolGrid>(in.grids, solid_grid), box_,

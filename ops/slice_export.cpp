@@ -76,15 +76,16 @@ class SliceExport : public Sink {
   [[nodiscard]] OutputEstimate output() const override {
     // Measured on dithered spheres, per leaf at the surface and per slice. A file of a folder
     // wastes half a block of the disk.
-    if (schema_.surface_leaves == 0) return {folder_, 0};
+    const double leaves = schema_.footprint.at_surface;
+    if (leaves == 0) return {folder_, 0};
     const double per_leaf = format_->bytes_per_leaf * filesOfLayer();
     const double per_slice = 500 + (folder_.ends_with(".zip") ? 0 : 2048 * filesOfLayer());
-    return {folder_,
-            schema_.surface_leaves * per_leaf + schema_.lattice.layers().size() * per_slice};
+    return {folder_, leaves * per_leaf + schema_.lattice.layers().size() * per_slice};
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    return Work{.us_per_leaf = 10 * filesOfLayer(), .us_per_layer = 200 * filesOfLayer()};
+    return Work{.us_per_surface_leaf = cost::slice_export_us * filesOfLayer(),
+                .us_per_layer = cost::slice_export_us_per_layer * filesOfLayer()};
   }
 
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {

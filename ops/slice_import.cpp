@@ -53,7 +53,8 @@ class SliceImport : public Source {
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    return Work{.us_per_leaf = 15, .us_per_layer = 450};
+    return Work{.us_per_surface_leaf = cost::slice_import_us,
+                .us_per_layer = cost::slice_import_us_per_layer};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {
@@ -97,17 +98,17 @@ class SliceImport : public Source {
     const ZRange stored = stack_->manifest().layers;
     const int taken = std::min(samples, stored.size());
     double sum = 0;
+    double fullest = 0;
     for (int sample = 0; sample < taken; ++sample) {
       const auto at = static_cast<std::int64_t>(stored.size()) * (2 * sample + 1) / (2 * taken);
       const double crossed = leavesCrossed(stack_->layer(stored.begin + static_cast<int>(at)));
       sum += crossed;
-      schema.leaves_per_row = std::max(schema.leaves_per_row, crossed);
+      fullest = std::max(fullest, crossed);
     }
     // A surface that leans crosses more leaves of a row than of one of its layers.
     constexpr double lean = 1.3;
-    schema.leaves_per_row *= lean;
-    schema.leaves = schema.surface_leaves =
-        lean * sum / taken * schema.lattice.layers().size() / leaf_layers;
+    const double leaves = sum / taken * schema.lattice.layers().size() / leaf_layers;
+    schema.footprint = Footprint{fullest, leaves, leaves}.scaled(lean);
   }
 
   /// The squares of eight by eight pixels that some run ends in.

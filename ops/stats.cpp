@@ -85,16 +85,12 @@ class LayerTally {
 class Stats : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", path_,
-                       "The .vdb to measure in place of the volume that reaches this step", false);
     options.text("histogram", histogram_grid_, "GRID",
                  "Counts the active values of this grid of numbers in bins");
     options.integer("bins", bins_, {2, 65536},
                     "Maximum number of bins; their edges are multiples of a power of two");
     json_.declare(options);
   }
-
-  [[nodiscard]] std::string inputFile() const override { return path_; }
 
   void plan(const Schema& in) override {
     lattice_ = in.lattice;
@@ -128,7 +124,9 @@ class Stats : public Sink {
     return names;
   }
 
-  [[nodiscard]] std::optional<Work> work() const override { return Work{.us_per_leaf = 14}; }
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_surface_leaf = cost::stats_us};
+  }
 
   void write(const Slab& in) override {
     const SliceFrame frame{lattice_.box, 0, false, false};
@@ -284,7 +282,6 @@ class Stats : public Sink {
     return text;
   }
 
-  std::string path_;
   std::string histogram_grid_;
   int bins_ = 32;
   JsonOption json_;

@@ -46,8 +46,8 @@ GridConstPtr whole(std::vector<Layers>& pieces, ZRange layers) {
   return own;
 }
 
-/// Slabs into one .vdb file, or as frames on a pipe. Stands in at the end of a chain that ends
-/// without a sink; in the middle it archives the stage.
+/// Slabs into one .vdb file, or as frames on a pipe. Ends every chain without another sink; in the
+/// middle of a chain it archives the stage.
 class WriteOperator : public Sink {
  public:
   void declare(Options& options) override {
@@ -76,7 +76,7 @@ class WriteOperator : public Sink {
 
   [[nodiscard]] bool isBarrier() const override { return !isPipe(); }
   [[nodiscard]] OutputEstimate output() const override {
-    if (isPipe()) return {};
+    if (isPipe()) return {"-", 0};
     // Measured on spheres and bunnies: what is active, packed. Bits are not packed, and noise
     // cannot be, which a grid of no class may hold.
     double per_leaf = 0;
@@ -88,15 +88,13 @@ class WriteOperator : public Sink {
       const double unpacked = half_ ? 0.5 : 1;
       per_leaf += leafBytes(grid) * (bits ? 1.1 : noise ? unpacked : packed);
     }
-    return {path_, schema_.leaves * per_leaf};
+    return {path_, schema_.footprint.total * per_leaf};
   }
   [[nodiscard]] std::optional<Work> work() const override {
-    constexpr double us_per_byte = 4e-3;
     double bytes = 0;
     for (const auto& [name, grid] : schema_.grids) bytes += leafBytes(grid);
-    return Work{.us_per_held_leaf = us_per_byte * bytes};
+    return Work{.us_per_held_leaf = cost::write_us_per_byte * bytes};
   }
-  [[nodiscard]] bool writesToStandardOutput() const override { return isPipe(); }
 
   void write(const Slab& in) override {
     if (frames_) {
@@ -163,8 +161,12 @@ class WriteOperator : public Sink {
 }  // namespace
 
 extern const OperatorInfo write{
-    "write", "Grids into a .vdb file or to standard output",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! dither -o solid.vdb",
-    [] { return std::unique_ptr<Operator>(std::make_unique<WriteOperator>()); }, true};
+    .name = "write",
+    .summary = "Grids into a .vdb file or to standard output",
+    .example =
+        "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! dither -o solid.vdb",
+    .make = []() -> std::unique_ptr<Operator> { return std::make_unique<WriteOperator>(); },
+    .transport = true,
+    .names_vdb = true};
 
 }  // namespace vdbdither

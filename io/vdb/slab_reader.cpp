@@ -33,7 +33,7 @@ void keepNamed(Grids& grids, const std::vector<std::string>& names) {
   grids = std::move(kept);
 }
 
-/// How many leaves each row of eight layers has, of the grid that has the most there.
+/// The leaves of each row of 8 layers, of the grid that has the most there.
 std::map<int, double> leavesOfRows(const Grids& grids) {
   std::map<int, double> most;
   for (const auto& [name, grid] : grids) {
@@ -77,19 +77,20 @@ void SlabReader::openPipe(int descriptor) {
 
 void SlabReader::openFile(const std::vector<std::string>& names) {
   VdbContents contents = readVdb(path_);
-  // What is not wanted may lie on any lattice.
+  // Grids that are not wanted may lie on any lattice.
   keepNamed(contents.grids, names);
   schema_ = schemaOf(contents, shown_);
-  // Where the file does not say, every layer counts: its box may be smaller than what it holds.
+  // A file without that metadata holds all layers, even beyond its box.
   ZRange held{std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};
   if (const auto some = schema_.metadata.extract(layers_key)) {
     std::istringstream(some.mapped()) >> held.begin >> held.end;
   }
+  Footprint& footprint = schema_.footprint;
   for (const auto& [z, leaves] : leavesOfRows(contents.grids)) {
-    schema_.leaves += leaves;
-    schema_.leaves_per_row = std::max(schema_.leaves_per_row, leaves);
+    footprint.total += leaves;
+    footprint.fullest_row = std::max(footprint.fullest_row, leaves);
   }
-  schema_.surface_leaves = schema_.leaves;
+  footprint.at_surface = footprint.total;
   slabs_.push_back({held, held, std::move(contents.grids)});
 }
 
@@ -101,7 +102,7 @@ double SlabReader::memoryBytes() const {
   return bytes;
 }
 
-Grids SlabReader::run(ZRange core) {
+Grids SlabReader::read(ZRange core) {
   const std::lock_guard lock(mutex_);
   if (isPipe()) takeFrames(core);
   checkCovered(core);
@@ -117,14 +118,14 @@ Grids SlabReader::run(ZRange core) {
   return result;
 }
 
-void SlabReader::drain() {
+void SlabReader::readToEnd() {
   const std::lock_guard lock(mutex_);
   slabs_.clear();
   while (isPipe() && !ended_) ended_ = !frames_->next();
 }
 
-/// Frames come in rising z and so do the cores asked of a pipe: what lies below is dropped, what is
-/// missing is fetched.
+/// Frames come in rising z, and so do the cores that are asked of a pipe: slabs below `core` are
+/// dropped, missing ones are read.
 void SlabReader::takeFrames(ZRange core) {
   std::erase_if(slabs_, [&](const Slab& slab) { return slab.core.end <= core.begin; });
   while (!ended_ && (slabs_.empty() || slabs_.back().core.end < core.end)) {
@@ -134,7 +135,7 @@ void SlabReader::takeFrames(ZRange core) {
   }
 }
 
-/// What was made with --layers lacks the others, which are not empty.
+/// An archive made with --layers lacks the other layers, which are not empty.
 void SlabReader::checkCovered(ZRange core) const {
   int covered = core.begin;
   for (const Slab& slab : slabs_) {
@@ -143,8 +144,8 @@ void SlabReader::checkCovered(ZRange core) const {
   if (covered < core.end) {
     throw DataError(shown_ + " lacks layer " +
                     std::to_string(covered - schema_.lattice.layers().begin) +
-                    "; where only some layers are wanted, give --layers to the last operator of "
-                    "the chain alone");
+                    "; to make only some layers, give --layers to the last operator of the chain "
+                    "alone");
   }
 }
 

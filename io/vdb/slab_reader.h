@@ -2,36 +2,33 @@
 
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "io/vdb/frames.h"
-#include "vdbdither/model/slab.h"
+#include "vdbdither/engine/input.h"
 
 namespace vdbdither {
 
-/// The layers of a .vdb file, or of frames on a pipe, on demand. A file is held whole, a pipe only
-/// where it was asked for.
-class SlabReader {
+/// The layers of a .vdb file, or of frames on a pipe, on demand. A file is held whole; of a pipe,
+/// only the slabs that the last call asked for.
+class SlabReader : public Input {
  public:
-  /// `path`: a .vdb file, a named pipe, or `-` for standard input. `names`: the grids wanted; none:
-  /// all. Throws DataError for what cannot be read, UsageError for a grid that is not there.
+  /// \param path   a .vdb file, a named pipe, or `-` for standard input
+  /// \param names  the grids to read; empty: all
+  ///
+  /// Throws DataError if the archive cannot be read, UsageError if a grid is missing.
   SlabReader(std::string path, const std::vector<std::string>& names);
-  ~SlabReader();
+  ~SlabReader() override;
+  SlabReader(const SlabReader&) = delete;
+  SlabReader& operator=(const SlabReader&) = delete;
 
-  [[nodiscard]] const Schema& schema() const { return schema_; }
-  [[nodiscard]] bool isPipe() const { return frames_ != nullptr; }
-  /// What is held of a file.
-  [[nodiscard]] double memoryBytes() const;
-
-  /// The grids over `core`, which rises from call to call on a pipe. Throws DataError where there
-  /// are layers missing of it. Safe to call from many threads.
-  [[nodiscard]] Grids run(ZRange core);
-
-  /// Reads a pipe to its closing frame and lets go of what is held, once `run` is not to be called
-  /// any more. Throws DataError where the frame does not come.
-  void drain();
+  [[nodiscard]] const std::string& path() const override { return path_; }
+  [[nodiscard]] bool isPipe() const override { return frames_ != nullptr; }
+  [[nodiscard]] const Schema& schema() const override { return schema_; }
+  [[nodiscard]] double memoryBytes() const override;
+  Grids read(ZRange core) override;
+  void readToEnd() override;
 
  private:
   void openPipe(int descriptor);

@@ -6,7 +6,7 @@ import pty
 import unittest
 
 import meshes
-from program import MIMAKI, PROGRAM, ProgramTest
+from program import MIMAKI, PROGRAM, ROOT, ProgramTest
 
 
 def operators():
@@ -38,7 +38,7 @@ class Words(ProgramTest):
         overview = self.succeed("--help").decode()
         self.assertEqual(overview, self.succeed("help").decode())
         for name in operators():
-            self.assertRegex(overview, rf"(?m)^(Sources|Filters|Sinks|Commands|  ) .*\b{name}\b")
+            self.assertRegex(overview, rf"(?m)^(Sources|Filters|Sinks|  ) .*\b{name}\b")
 
     def test_help_of_every_operator_shows_usage_options_and_an_example(self):
         for name in operators():
@@ -66,6 +66,42 @@ class Words(ProgramTest):
         text = self.succeed("mesh2sdf", "part.stl", *MIMAKI, "-o", "a.vdb", "--explain").decode()
         self.assertRegex(text, r"stage +write a\.vdb +\(barrier")
         self.assertEqual(self.listing(), self.inputs)
+
+    def test_explain_lists_what_is_read_besides_the_slabs(self):
+        self.succeed("mesh2sdf", "part.stl", *MIMAKI, "-o", "a.vdb")
+        text = self.succeed("csg", "a.vdb", "--union", "a.vdb", "-o", "b.vdb", "--explain").decode()
+        self.assertRegex(text, r"(?m)^input +a\.vdb for read, a file of (\d+) layers$(.*\n)+"
+                               r"^input +a\.vdb for csg, a file of \1 layers$")
+        text = self.shell("vdbdither read a.vdb | vdbdither compare a.vdb --explain").decode()
+        self.assertRegex(text, r"(?m)^input +standard input for read, a pipe of (\d+) layers$(.*\n)+"
+                               r"^input +a\.vdb for compare, a file of \1 layers$")
+
+    def test_explain_as_json_is_the_plan_of_the_job(self):
+        chain = ("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "out", "--layers", "8:24", "--slab", "16")
+        plan = json.loads(self.succeed(*chain, "--explain", "--json"))
+        self.assertEqual(self.listing(), self.inputs)
+        self.assertEqual(plan["layers"], {"begin": 8, "end": 24})
+        self.assertEqual(plan["slab_layers"], 16)
+        self.assertEqual([stage["name"] for stage in plan["stages"]], ["mesh2sdf", "dither", "slice-export"])
+        source, dither, export = plan["stages"]
+        self.assertEqual(source["arguments"], f"part.stl {' '.join(MIMAKI)}")
+        self.assertLess(source["layers"]["begin"], 8)
+        self.assertGreater(source["layers"]["end"], 24)
+        self.assertEqual(dither["reads"][0]["grid"], "surface")
+        self.assertGreater(dither["reads"][0]["below"], 0)
+        self.assertEqual(dither["handed_on"], ["solid"])
+        self.assertGreater(source["leaves"]["total"], 0)
+        self.assertEqual(export["output"]["path"], "out")
+        self.assertGreater(export["output"]["bytes"], 0)
+        for key in ("seconds", "memory_bytes", "memory_limit_bytes"):
+            self.assertGreater(plan[key], 0)
+        # The documented keys are those that there are.
+        page = (ROOT / "docs/job-plan.md").read_text()
+        for keys in (plan, source, dither["reads"][0], source["leaves"], export["output"]):
+            for key in keys:
+                self.assertIn(f"`{key}`", page)
+        report = json.loads(self.succeed(*chain, "--json"))
+        self.assertAlmostEqual(report["expected_seconds"], plan["seconds"])
 
     def test_json_reports_every_stage(self):
         report = json.loads(self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "out", "--json"))
@@ -200,7 +236,7 @@ class Refusals(ProgramTest):
         self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "out", "--stream")
 
     def test_more_memory_than_allowed_is_refused_before_the_run(self):
-        self.refuse(1, "the run needs about", "mesh2sdf", "part.stl", *MIMAKI, "-o", "x.vdb", "--memory", "1MiB")
+        self.refuse(1, "the job needs about", "mesh2sdf", "part.stl", *MIMAKI, "-o", "x.vdb", "--memory", "1MiB")
 
     def test_layers_slab_and_memory_say_what_they_accept(self):
         chain = ("mesh2sdf", "part.stl", *MIMAKI, "-o", "x.vdb")

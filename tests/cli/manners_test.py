@@ -164,12 +164,10 @@ class Manners(ProgramTest):
                         "mesh2sdf", "part.stl", *MIMAKI, "--fit", length, "-o", "x.vdb")
         self.refuse(2, "mesh2sdf: --fit: the value is missing; give --fit LENGTH", "mesh2sdf", "part.stl", *MIMAKI, "--fit")
 
-    def test_a_call_without_words_shows_what_there_is(self):
-        done = self.run_program()
-        self.assertEqual((done.returncode, done.stdout), (2, b""))
-        said = done.stderr.decode()
-        self.assertTrue(said.startswith(self.succeed("--help").decode()))
-        self.assertTrue(said.endswith("vdbdither: there is no operator\n"))
+    def test_a_call_without_words_prints_the_overview(self):
+        self.assertEqual(self.succeed(), self.succeed("--help"))
+        self.assertEqual(self.shell("vdbdither | cat"), self.succeed("--help"))
+        self.refuse(2, "run: the chain is empty", "run", " ")
 
     def test_what_does_not_fit_on_the_disk_is_refused_before_the_run(self):
         disk = self.folder / "disk"

@@ -20,12 +20,23 @@ class MeasureTest(ProgramTest):
         words = self.succeed("measure", "result.stl", "--reference", "part.stl").decode()
         self.assertIn("by area", words)
 
-    def test_what_stands_alone_is_no_part_of_a_chain(self):
-        message = "measure: works on the files it names and is no part of a chain then"
+    def test_a_mesh_file_is_no_part_of_a_chain(self):
+        message = "measure: works on 'part.stl' only if it is the whole command line, not in a chain"
         alone = ("measure", "part.stl", "--reference", "part.stl")
         self.refuse(2, message, "mesh2sdf", "part.stl", *MIMAKI, "!", *alone)
         self.refuse(2, message, *alone, "!", "write", "a.vdb")
-        self.refuse(2, "measure: names its own files, not --input or --output", *alone, "-i", "a.vdb")
+        for option in (("-i", "a.vdb"), ("-o", "a.vdb"), ("--layers", "0:8"), ("--explain",)):
+            self.refuse(2, ": only for chains, not with a file to work on", *alone, *option)
+
+    def test_a_mesh_file_takes_the_options_of_every_operator(self):
+        alone = ("measure", "part.stl", "--reference", "part.stl", "--report", "report.json")
+        self.assertEqual(self.succeed(*alone, "--threads", "1", "--quiet", "--slab", "8"), b"")
+        done = self.run_program(*alone, "--overwrite", "--verbose")
+        self.assertEqual((done.returncode, done.stdout), (0, b""))
+        self.assertRegex(done.stderr.decode(), r"(?m)^measure +[\d.]+ s +0 voxels .* rms_mm ")
+        report = json.loads(self.succeed("render", "part.stl", "part.png", "--json"))
+        self.assertEqual([stage["name"] for stage in report["stages"]], ["render"])
+        self.assertEqual(report["stages"][0]["counts"]["triangles"], 12)
 
     def test_a_chain_fused_or_piped_gives_the_same_figures_and_mesh(self):
         self.shell("vdbdither mesh2sdf part.stl --printer mimaki-3duj-553 ! dither --mask white ! simulate ! "

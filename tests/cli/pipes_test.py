@@ -206,6 +206,7 @@ class Explained(ProgramTest):
                        f"csg --union <({self.source}) -o x.vdb"):
             with self.subTest(reader=reader):
                 self.assertIn(b"\nmemory ", self.shell(f"{self.source} | vdbdither {reader} --explain"))
+                self.assertIn(b'"memory_bytes":', self.shell(f"{self.source} | vdbdither read --json ! {reader} --explain"))
                 self.assertEqual(self.listing(), before)
 
     def test_explain_says_what_it_knows_before_its_writer_is_done(self):

@@ -109,6 +109,23 @@ TEST_P(Contract, ItsWordsAreOfOneStyle) {
   }
 }
 
+TEST_P(Contract, OnAFileOfItsOwnItTakesTheSameOptions) {
+  if (!GetParam()->on_file.make) GTEST_SKIP() << "works in chains only";
+  Options options;
+  Options of_tool;
+  const std::unique_ptr<Operator> made = GetParam()->make();
+  const std::unique_ptr<Tool> tool = GetParam()->on_file.make();
+  made->declare(options);
+  tool->declare(of_tool);
+  ASSERT_EQ(of_tool.all().size(), options.all().size() + 1);
+  EXPECT_EQ(of_tool.all().front().kind, Option::Kind::positional);
+  for (const Option& option : options.all()) {
+    const Option* same = of_tool.find(option.name);
+    ASSERT_TRUE(same) << option.name;
+    EXPECT_EQ(same->help, option.help);
+  }
+}
+
 TEST_P(Contract, SlabHeightAndThreadsChangeNoByte) {
   const fs::path reference = enter("reference");
   const std::string printed = runExample();
@@ -237,9 +254,11 @@ TEST(ContractCheck, CatchesAReachThatLies) {
   for (int z = 0; z < 40; z += 8) solid->tree().setValueOn({3, 3, z + 3}, true);
   schema.grids["solid"] = solid->copyGridWithNewTree();
   const Grids whole{{"solid", solid}};
-  EXPECT_EQ(firstBreach(LookAbove(true), schema, whole, 8), "");
+  LookAbove honest(true);
+  EXPECT_EQ(firstBreach(honest, schema, whole, 8), "");
+  LookAbove lying(false);
   EXPECT_EQ(
-      firstBreach(LookAbove(false), schema, whole, 8),
+      firstBreach(lying, schema, whole, 8),
       "'solid' depends on the slab, or on what lies beyond the declared reach, in layers 0 to 7");
 }
 

@@ -45,6 +45,14 @@ class CsgOperatorTest : public testing::Test {
     return [schema, arguments] { test::filterCalled("csg", arguments)->plan(schema); };
   }
 
+  /// What the planned filter makes of `in` over all layers of `out`.
+  static Grids runOver(Filter& filter, const Schema& out, const Schema& in) {
+    const ZRange all = out.lattice.layers();
+    Slab slab{all, all, {{"surface", in.grids.at("surface")}}};
+    test::addInputs(filter, slab);
+    return filter.run(slab);
+  }
+
   test::ScratchFolder folder;
   std::filesystem::path path = folder / "second.vdb";
 };
@@ -60,8 +68,7 @@ TEST_F(CsgOperatorTest, AUnionHoldsBothAndNumbersThem) {
   EXPECT_EQ(out.lattice.box.max(), latticeAt(0.6).box.max());
   EXPECT_EQ(out.grids.at("part")->getMetadata<openvdb::Int32Metadata>(part_count_key)->value(), 2);
 
-  const ZRange all = out.lattice.layers();
-  const Grids made = filter->run({all, all, {{"surface", in.grids.at("surface")}}});
+  const Grids made = runOver(*filter, out, in);
   const auto surface = openvdb::gridConstPtrCast<FloatGrid>(made.at("surface"));
   const auto parts = openvdb::gridConstPtrCast<Int32Grid>(made.at("part"));
   EXPECT_LT(surface->tree().getValue({0, 0, 0}), 0);
@@ -71,8 +78,7 @@ TEST_F(CsgOperatorTest, AUnionHoldsBothAndNumbersThem) {
   EXPECT_EQ(parts->tree().getValue({0, 0, 14}), 1) << "in both";
   const auto other = test::filterCalled("csg", {"--union", second, "--priority", "second"});
   other->plan(in);
-  const auto swapped = openvdb::gridConstPtrCast<Int32Grid>(
-      other->run({all, all, {{"surface", in.grids.at("surface")}}}).at("part"));
+  const auto swapped = openvdb::gridConstPtrCast<Int32Grid>(runOver(*other, out, in).at("part"));
   EXPECT_EQ(swapped->tree().getValue({0, 0, 14}), 2);
 }
 
@@ -85,13 +91,25 @@ TEST_F(CsgOperatorTest, ADifferenceAndAnIntersectionKeepTheBoxAndTheParts) {
     const Schema out = filter->plan(in);
     EXPECT_EQ(out.lattice.box, in.lattice.box);
     EXPECT_TRUE(out.grids.contains("part"));
-    const ZRange all = out.lattice.layers();
-    const Grids made = filter->run({all, all, {{"surface", in.grids.at("surface")}}});
+    const Grids made = runOver(*filter, out, in);
     EXPECT_EQ(made.size(), 1U);
     const auto surface = openvdb::gridConstPtrCast<FloatGrid>(made.at("surface"));
     EXPECT_EQ(surface->tree().getValue({0, 0, 0}) < 0, std::string(operation) == "--difference");
     EXPECT_EQ(surface->tree().getValue({0, 0, 15}) < 0, std::string(operation) == "--intersection");
   }
+}
+
+TEST_F(CsgOperatorTest, LeavesOfBothAreCountedAndUnknownOnesMakeTheSumUnknown) {
+  const std::string second = write(ballAt(0.6));
+  Schema in = ballAt(0);
+  const auto footprint = [&] {
+    return test::filterCalled("csg", {"--union", second})->plan(in).footprint;
+  };
+  EXPECT_FALSE(footprint().known());
+  in.footprint = {10, 100, 50};
+  const Footprint of_second = footprint();
+  EXPECT_GT(of_second.total, 100);
+  EXPECT_EQ(of_second.total - 100, of_second.at_surface - 50) << "a file does not tell them apart";
 }
 
 TEST_F(CsgOperatorTest, RefusesWhatDoesNotFit) {

@@ -82,7 +82,7 @@ TEST(Info, SaysThatNothingTakesPoints) {
   const auto points = openvdb::points::PointDataGrid::create();
   points->setName("points");
   writeVdb(path, {{{"points", points}}, {}}, VdbCodec::mask, path);
-  const test::SinkCalled info("info", {path});
+  const test::FileToolCalled info("info", {path});
   info.run();
   EXPECT_THAT(info.said.printed, testing::StartsWith("points    ptdataidx32: 0 voxels, "));
   EXPECT_THAT(info.said.printed,

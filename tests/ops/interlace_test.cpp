@@ -55,6 +55,15 @@ TEST(Interlace, PicksTheRefinedRowAQuarterVoxelBelowOnEvenSlicesAndAboveOnOddOne
   }
 }
 
+TEST(Interlace, HasHalfTheLeavesOfARefinedLattice) {
+  Schema schema = on(refined(), shapes[0]);
+  schema.footprint = {12, 100, 80};
+  EXPECT_EQ(test::filterCalled("interlace")->plan(schema).footprint, (Footprint{6, 50, 40}));
+  schema = on(plain, shapes[0]);
+  schema.footprint = {12, 100, 80};
+  EXPECT_EQ(test::filterCalled("interlace")->plan(schema).footprint, (Footprint{12, 100, 80}));
+}
+
 TEST(Interlace, InterpolatesOnThePlainLattice) {
   for (const test::Distance& distance : shapes) {
     const Schema schema = on(plain, distance);

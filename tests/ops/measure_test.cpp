@@ -30,6 +30,11 @@ struct Measuring : test::SinkCalled {
       : SinkCalled("measure", arguments) {}
 };
 
+struct MeasuringMesh : test::FileToolCalled {
+  explicit MeasuringMesh(const std::vector<std::string>& arguments)
+      : FileToolCalled("measure", arguments) {}
+};
+
 nlohmann::json jsonOf(const std::filesystem::path& path) {
   return nlohmann::json::parse(std::ifstream(path));
 }
@@ -49,10 +54,9 @@ class Measure : public testing::Test {
 
 TEST_F(Measure, AMeshOfItsOwnIsMeasuredWithoutAChain) {
   save(test::boxMesh(Vec3d(-0.01), Vec3d(2.01, 2.01, 1.01)), "result.stl");
-  const Measuring measuring({file("result.stl"), "--reference", file("part.stl"), "--margin", "0.1",
-                             "--report", file("report.json"), "--map", file("map.ply")});
-  EXPECT_TRUE(measuring->standsAlone());
-  measuring.run({});
+  const MeasuringMesh measuring({file("result.stl"), "--reference", file("part.stl"), "--margin",
+                                 "0.1", "--report", file("report.json"), "--map", file("map.ply")});
+  measuring.run();
   const nlohmann::json report = jsonOf(scratch / "report.json");
   EXPECT_NEAR(report["area"]["p50_mm"], 0.01, 1e-6);
   EXPECT_NEAR(report["area"]["bias_mm"], 0.01, 1e-4);
@@ -103,29 +107,29 @@ TEST_F(Measure, VoxelsAreMeasuredAsTheyComeWithTheirPiecesAndCavities) {
 TEST_F(Measure, TheReferenceIsPlacedAsThePartWas) {
   save(test::transformed(test::boxMesh({0, 0, 0}, {20, 20, 10}), {10, 0, 30}, {0, 0, 0}),
        "result.stl");
-  const Measuring measuring({file("result.stl"), "--reference", file("part.stl"), "--unit", "cm",
-                             "--rotate", "10,0,30", "--spacing", "0.5", "--report",
-                             file("report.json")});
-  measuring.run({});
+  const MeasuringMesh measuring({file("result.stl"), "--reference", file("part.stl"), "--unit",
+                                 "cm", "--rotate", "10,0,30", "--spacing", "0.5", "--report",
+                                 file("report.json")});
+  measuring.run();
   EXPECT_NEAR(jsonOf(scratch / "report.json")["area"]["max_mm"], 0, 3e-6);
 }
 
 TEST_F(Measure, SaysItInWordsOrAsJson) {
   save(test::boxMesh(Vec3d(-0.01), Vec3d(2.01, 2.01, 1.01)), "result.stl");
-  const Measuring words({file("result.stl"), "--reference", file("part.stl")});
-  words.run({});
+  const MeasuringMesh words({file("result.stl"), "--reference", file("part.stl")});
+  words.run();
   EXPECT_THAT(words.said.printed, HasSubstr("by area"));
   EXPECT_THAT(words.said.printed, HasSubstr("10.000"));
-  const Measuring json({file("result.stl"), "--reference", file("part.stl"), "--json"});
-  json.run({});
+  const MeasuringMesh json({file("result.stl"), "--reference", file("part.stl"), "--json"});
+  json.run();
   EXPECT_NEAR(nlohmann::json::parse(json.said.printed)["area"]["p50_mm"], 0.01, 1e-6);
 }
 
 TEST_F(Measure, TheMapStatesItsRangeAndColoursByTheSign) {
   save(test::boxMesh(Vec3d(0.01, -0.01, 0), Vec3d(2.01, 2.01, 1)), "result.stl");
-  Measuring({file("result.stl"), "--reference", file("part.stl"), "--map", file("map.ply"),
-             "--map-range", "20um", "--report", file("report.json")})
-      .run({});
+  MeasuringMesh({file("result.stl"), "--reference", file("part.stl"), "--map", file("map.ply"),
+                 "--map-range", "20um", "--report", file("report.json")})
+      .run();
   std::ifstream stream(scratch / "map.ply", std::ios::binary);
   const std::string text((std::istreambuf_iterator<char>(stream)), {});
   EXPECT_THAT(text,
@@ -137,20 +141,20 @@ TEST_F(Measure, SmoothingComesBeforeMeasuring) {
   save(test::sphereMesh({1, 1, 0.5}, 0.4, 20), "result.stl");
   const std::vector<std::string> arguments{file("result.stl"), "--reference", file("part.stl"),
                                            "--json"};
-  const Measuring plain(arguments);
-  plain.run({});
+  const MeasuringMesh plain(arguments);
+  plain.run();
   std::vector<std::string> more = arguments;
   more.insert(more.end(), {"--smooth", "taubin", "--iterations", "20"});
-  const Measuring smooth(more);
-  smooth.run({});
+  const MeasuringMesh smooth(more);
+  smooth.run();
   EXPECT_EQ(nlohmann::json::parse(smooth.said.printed)["surface"]["smoothing"], 20);
   EXPECT_NE(nlohmann::json::parse(smooth.said.printed)["surface"]["volume_mm3"],
             nlohmann::json::parse(plain.said.printed)["surface"]["volume_mm3"]);
 }
 
 TEST_F(Measure, RefusesWhatCannotBeMeasured) {
-  const auto plan = [&](const std::vector<std::string>& arguments, const Schema& in = {}) {
-    return [=] { Measuring(arguments)->plan(in); };
+  const auto plan = [&](const std::vector<std::string>& arguments) {
+    return [=] { MeasuringMesh(arguments).run(); };
   };
   EXPECT_THAT(plan({file("part.stl")}),
               ThrowsMessage<UsageError>("'--reference' is missing; see --help"));
@@ -168,15 +172,18 @@ TEST_F(Measure, RefusesWhatCannotBeMeasured) {
   EXPECT_THAT(
       plan({file("part.stl"), "--reference", file("part.stl"), "--report", file("part.stl")}),
       ThrowsMessage<UsageError>(HasSubstr("exists; --overwrite replaces it")));
-  EXPECT_THAT(plan({"--reference", file("part.stl")}),
-              ThrowsMessage<DataError>(HasSubstr("there is none")));
+  EXPECT_THAT(
+      [&] {
+        Measuring({"--reference", file("part.stl")})->plan({});
+      },
+      ThrowsMessage<DataError>(HasSubstr("there is none")));
   Mesh open = test::boxMesh({0, 0, 0}, {1, 1, 1});
   open.triangles.pop_back();
   save(open, "open.stl");
   EXPECT_THAT(
       [&] {
-        Measuring({file("open.stl"), "--reference", file("part.stl"), "--smooth", "taubin"})
-            .run({});
+        MeasuringMesh({file("open.stl"), "--reference", file("part.stl"), "--smooth", "taubin"})
+            .run();
       },
       ThrowsMessage<DataError>(HasSubstr("is no closed mesh")));
   const auto nothing = BoolGrid::create(false);

@@ -1,6 +1,7 @@
 #include "tests/support/contract.h"
 
 #include "io/vdb/vdb.h"
+#include "tests/support/filters.h"
 #include "vdbdither/engine/window.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
@@ -42,13 +43,14 @@ GridConstPtr spoiled(const GridConstPtr& grid, ZRange range, const CoordBBox& bo
   return copy;
 }
 
-Slab slabOf(const Filter& filter, const Schema& in, const Grids& whole, ZRange core) {
+Slab slabOf(Filter& filter, const Schema& in, const Grids& whole, ZRange core) {
   const ZRange layers = in.lattice.layers();
   Slab slab{core, reached(core, widest(filter.reads()), layers), {}};
   for (const Read& read : filter.reads()) {
     slab.grids[read.grid] =
         spoiled(whole.at(read.grid), reached(core, read.reach, layers), in.lattice.box);
   }
+  addInputs(filter, slab);
   return slab;
 }
 
@@ -58,7 +60,7 @@ std::string layersText(ZRange range) {
 
 }  // namespace
 
-std::string firstBreach(const Filter& filter, const Schema& in, const Grids& whole, int height) {
+std::string firstBreach(Filter& filter, const Schema& in, const Grids& whole, int height) {
   const ZRange layers = in.lattice.layers();
   const Grids expected = filter.run(slabOf(filter, in, whole, layers));
   for (int begin = alignedToLeaves(layers).begin; begin < layers.end; begin += height) {
@@ -86,6 +88,7 @@ std::string firstBreach(const Filter& filter, const Schema& in, const Grids& who
     }
     Slab empty{core, slab.valid, {}};
     for (const Read& read : filter.reads()) empty.grids[read.grid] = in.grids.at(read.grid);
+    addInputs(filter, empty);
     if (filter.run(empty).size() != made.size()) return "it makes other grids of an empty slab";
   }
   return "";

@@ -10,6 +10,6 @@ namespace vdbdither::test {
 /// same voxels for slabs of `height` layers as for the whole, whatever lies outside its declared
 /// reach; voxels only within the core; inputs left as they were; empty slabs accepted. Returns the
 /// first breach in words, or nothing.
-std::string firstBreach(const Filter& filter, const Schema& in, const Grids& whole, int height);
+std::string firstBreach(Filter& filter, const Schema& in, const Grids& whole, int height);
 
 }  // namespace vdbdither::test

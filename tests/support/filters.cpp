@@ -35,10 +35,18 @@ Schema ballWithBand(const Lattice& lattice, double radius_mm, double band_mm) {
   return schemaOf(lattice, {{"surface", sampled(sphere({0, 0, 0}, radius_mm), lattice, band_mm)}});
 }
 
+void addInputs(Filter& filter, Slab& slab) {
+  for (Input* input : filter.inputs()) {
+    const ZRange there = intersection(slab.core, input->schema().lattice.layers());
+    slab.inputs.push_back(there.empty() ? Grids() : input->read(there));
+  }
+}
+
 Grids runWhole(Filter& filter, const Schema& schema) {
   filter.plan(schema);
   Slab slab{schema.lattice.layers(), schema.lattice.layers(), {}};
   for (const Read& read : filter.reads()) slab.grids[read.grid] = schema.grids.at(read.grid);
+  addInputs(filter, slab);
   return filter.run(slab);
 }
 
@@ -79,6 +87,7 @@ std::vector<std::pair<ZRange, Grids>> runInSlabs(Filter& filter, const Schema& s
       slab.valid = {std::min(slab.valid.begin, reach.begin), std::max(slab.valid.end, reach.end)};
       slab.grids[read.grid] = spoiled(schema.grids.at(read.grid), reach);
     }
+    addInputs(filter, slab);
     results.emplace_back(slab.core, filter.run(slab));
   }
   return results;

@@ -26,6 +26,9 @@ inline auto planning(const std::string& name, const Schema& schema,
   return [=] { filterCalled(name, arguments)->plan(schema); };
 }
 
+/// Adds the grids of the filter's inputs over the core of `slab`, as the engine does.
+void addInputs(Filter& filter, Slab& slab);
+
 /// What `filter`, planned on these grids, makes of the whole lattice in one slab.
 Grids runWhole(Filter& filter, const Schema& schema);
 

@@ -16,11 +16,17 @@ SinkCalled::SinkCalled(const std::string& name, const std::vector<std::string>& 
 void SinkCalled::run(const Schema& schema, const Grids& grids, int height) const {
   Sink& sink = **this;
   sink.plan(schema);
-  if (!sink.standsAlone()) {
-    for (const Slab& slab : cutIntoSlabs(grids, schema.lattice, height)) sink.write(slab);
-  }
-  sink.drain();
+  for (const Slab& slab : cutIntoSlabs(grids, schema.lattice, height)) sink.write(slab);
+  for (Input* input : sink.inputs()) input->readToEnd();
   sink.finish();
+}
+
+FileToolCalled::FileToolCalled(const std::string& name, const std::vector<std::string>& arguments)
+    : made_(findOperator(name).on_file.make()) {
+  Options options;
+  made_->declare(options);
+  options.parse(arguments);
+  made_->setReporter(&said);
 }
 
 }  // namespace vdbdither::test

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <string>
 
+#include "vdbdither/engine/named_file.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -94,6 +95,63 @@ std::vector<std::string> splitWords(const std::string& line) {
   if (quote) throw UsageError(std::string("a ") + quote + " is not closed");
   finish();
   return words;
+}
+
+Chain::Chain(const std::vector<Step>& steps, const FindOperator& find) {
+  options_.declare(run_options_);
+  for (const Step& step : steps) {
+    addStage(step, find);
+    if (help_) return;
+  }
+  addRead(find);
+  addWrite(find);
+}
+
+void Chain::addStage(const Step& step, const FindOperator& find) {
+  const OperatorInfo& info = find(step.verb);
+  if (asksForHelp(step.arguments)) {
+    help_ = &info;
+    stages_.clear();
+    return;
+  }
+  auto stage = std::make_unique<Stage>(info);
+  std::vector<std::string> arguments = step.arguments;
+  if (!stage->source()) {
+    const std::string file = takeNamedFile(arguments, info, stage->options(), run_options_);
+    if (!file.empty()) refuseNamedFile(info, file, !stages_.empty());
+    if (stages_.empty()) named_input_ = file;
+  } else if (!stages_.empty()) {
+    throw UsageError(stage->name() + ": makes slabs of its own and can only begin a chain");
+  }
+  stage->parse(arguments, run_options_);
+  stages_.push_back(std::move(stage));
+}
+
+void Chain::addRead(const FindOperator& find) {
+  const std::string first = stages_.front()->name();
+  if (stages_.front()->source()) {
+    if (options_.input.empty()) return;
+    throw UsageError("--input: the chain begins with " + first + ", which reads its own input");
+  }
+  if (!named_input_.empty() && !options_.input.empty())
+    throw UsageError("--input: " + first + " reads '" + named_input_ + "'");
+  const std::string& path = named_input_.empty() ? options_.input : named_input_;
+  auto stage = std::make_unique<Stage>(find("read"));
+  stage->parse(path.empty() ? std::vector<std::string>{} : std::vector{path}, run_options_);
+  stages_.insert(stages_.begin(), std::move(stage));
+}
+
+void Chain::addWrite(const FindOperator& find) {
+  if (stages_.back()->sink()) {
+    if (options_.output.empty()) return;
+    throw UsageError("--output: the chain ends with " + stages_.back()->name() +
+                     ", which names its own output");
+  }
+  std::vector<std::string> arguments{options_.output.empty() ? "-" : options_.output};
+  if (options_.overwrite) arguments.emplace_back("--overwrite");
+  auto stage = std::make_unique<Stage>(find("write"));
+  stage->parse(arguments, run_options_);
+  stages_.push_back(std::move(stage));
 }
 
 }  // namespace vdbdither

@@ -49,10 +49,10 @@ std::string whatItIs(const Page& page) {
   if (page.kind == "sink")
     return "A sink: it takes the layers that reach it, and passes them on in the middle of a "
            "chain.";
-  return "A command: it stands alone, in no chain.";
+  return "A tool: it is the whole command line, never part of a chain.";
 }
 
-/// `words` in lines of at most `line_width`, all indented alike.
+/// `words` in lines of at most `line_width` characters, all with the same indent.
 std::string wrapped(const std::vector<std::string>& words, std::size_t indent) {
   std::string text;
   std::size_t column = indent;
@@ -121,7 +121,7 @@ std::string replaced(std::string_view text, std::string_view from, std::string_v
   return result;
 }
 
-/// Fit for a cell of a table.
+/// `text` escaped for a cell of a table.
 std::string cell(const std::string& text) { return replaced(text, "|", "\\|"); }
 
 std::string markdownOptions(const Options& options) {
@@ -141,24 +141,25 @@ std::string markdownPage(const Page& page) {
   std::string text = "# " + page.name + "\n\n" + page.summary + ".\n\n" + whatItIs(page) +
                      "\n\n```\n" + usage(page) + "\n```\n\n";
   if (!page.options.all().empty()) text += markdownOptions(page.options) + "\n";
-  if (page.kind != "tool") text += "Besides the [options of every operator](README.md).\n\n";
+  if (page.kind != "tool") text += "The [options of every operator](README.md) apply as well.\n\n";
   return text + "Example:\n\n    vdbdither " + replaced(page.example, "\n", "\n    vdbdither ") +
          "\n";
 }
 
 std::string markdownIndex() {
-  std::string text = "# Operators and commands\n\n| | | |\n| --- | --- | --- |\n";
+  std::string text = "# Operators and tools\n\n| | | |\n| --- | --- | --- |\n";
   for (const Page& page : pages()) {
     text += "| [" + page.name + "](" + page.name + ".md) | " + page.kind + " | " + page.summary +
             " |\n";
   }
   return text +
-         "\n## Options of every operator\n\nThey concern the run as a whole, wherever in a "
-         "chain they stand.\n\n" +
+         "\n## Options of every operator\n\nThey apply to the whole job and may follow any "
+         "operator of "
+         "a chain.\n\n" +
          markdownOptions(commonPage().options);
 }
 
-/// Fit for running text in troff.
+/// `text` escaped for troff.
 std::string troff(const std::string& text) {
   std::string safe = replaced(replaced(text, "\\", "\\e"), "-", "\\-");
   const bool control = safe.starts_with('.') || safe.starts_with('\'');
@@ -190,7 +191,8 @@ std::string manualPage(const Page& page) {
   std::string text = troffHead("vdbdither-" + page.name, page.summary) + ".SH SYNOPSIS\n.B " +
                      troff(usage(page)) + "\n.SH DESCRIPTION\n" + troff(whatItIs(page)) + "\n";
   if (!page.options.all().empty()) text += ".SH OPTIONS\n" + troffOptions(page.options);
-  if (page.kind != "tool") text += ".PP\nOptions of every operator: see\n.BR vdbdither (1).\n";
+  if (page.kind != "tool")
+    text += ".PP\nThe options of every operator are listed in\n.BR vdbdither (1).\n";
   return text + ".SH EXAMPLE\n.nf\nvdbdither " +
          troff(replaced(page.example, "\n", "\nvdbdither ")) +
          "\n.fi\n.SH SEE ALSO\n.BR vdbdither (1)\n";
@@ -204,7 +206,7 @@ std::string mainManualPage() {
       "vdbdither help\n[OPERATOR]\n.SH DESCRIPTION\nOperators work on sparse OpenVDB "
       "grids, layer by layer, and chain. They read and write .vdb: files with names, "
       "or pipes between processes; an exclamation mark joins operators in one "
-      "process.\n.SH OPERATORS AND COMMANDS\n";
+      "process.\n.SH OPERATORS AND TOOLS\n";
   for (const Page& page : pages())
     text += ".TP\n.BR " + troff("vdbdither-" + page.name) + " (1)\n" + troff(page.summary) + ".\n";
   return text + ".SH OPTIONS OF EVERY OPERATOR\n" + troffOptions(commonPage().options) +
@@ -216,12 +218,28 @@ std::string mainManualPage() {
 }  // namespace
 
 Page pageOf(const OperatorInfo& info) {
-  const std::shared_ptr<Operator> made = info.make();
+  struct Owner {
+    std::unique_ptr<Operator> made;
+    std::unique_ptr<Tool> tool;
+    std::string input;
+  };
+  const auto owner = std::make_shared<Owner>();
+  owner->made = info.make();
   Page page{std::string(info.name),    "sink", std::string(info.summary),
-            std::string(info.example), {},     made};
-  if (dynamic_cast<Source*>(made.get())) page.kind = "source";
-  if (dynamic_cast<Filter*>(made.get())) page.kind = "filter";
-  made->declare(page.options);
+            std::string(info.example), {},     owner};
+  if (dynamic_cast<Source*>(owner->made.get())) page.kind = "source";
+  if (dynamic_cast<Filter*>(owner->made.get())) page.kind = "filter";
+  if (info.on_file.make) {
+    owner->tool = info.on_file.make();
+    owner->tool->declare(page.options);
+    return page;
+  }
+  if (page.kind != "source") {
+    page.options.positional("input", owner->input,
+                            "The .vdb to read if this operator begins the chain, as with --input",
+                            false);
+  }
+  owner->made->declare(page.options);
   return page;
 }
 
@@ -281,8 +299,8 @@ std::string overview() {
   }
   return text +
          "\nOperators read and write .vdb: -i and -o name files, pipes carry layers, ! joins\n"
-         "operators in one process. A chain begins with a source, or with read if it has\n"
-         "none, and ends with a sink, or with write.\n\n"
+         "operators in one process. A chain begins with a source or a .vdb (read), and ends\n"
+         "with a sink or -o (write).\n\n"
          "Example: vdbdither mesh2sdf part.stl --printer mimaki-3duj-553 ! dither !\n"
          "           material-assign ! slice-export out\n";
 }

@@ -9,41 +9,43 @@
 
 namespace vdbdither {
 
-/// What is to be said of a verb. All manuals are made from these.
+/// The manual of a verb, from which --help, pages and completion are made.
 struct Page {
   std::string name;
-  std::string kind;  ///< source, filter, sink or command
+  std::string kind;  ///< source, filter, sink or tool
   std::string summary;
   std::string example;  ///< lines, each without the name of the program
   Options options;
-  std::shared_ptr<void> owner;  ///< what the options are bound to
+  std::shared_ptr<void> owner;  ///< holds the members that the options are bound to
 };
 
+/// The options of a filter or sink begin with the file that may begin its chain. If it also works
+/// on files as a tool, they are those of the tool.
 Page pageOf(const OperatorInfo& info);
 Page pageOf(const ToolInfo& info);
 
-/// Every operator and every command that is for people, by name.
+/// Every operator and every tool that is not hidden, by name.
 std::vector<Page> pages();
 
 /// The options that every operator takes.
 Page commonPage();
 
-/// What --help says of a verb.
+/// The text of --help for a verb.
 std::string helpText(const Page& page);
 
-/// What `help` says: it fits a screen of 80 columns and 24 lines.
+/// The text of `help`; fits a screen of 80 columns and 24 lines.
 std::string overview();
 
-/// What `help all` says: a line for each verb.
+/// The text of `help all`: a line for each verb.
 std::string listing();
 
-/// Markdown files by name: one for each verb, and README.md that lists them.
+/// Markdown files by name: one for each verb, and README.md, which lists them.
 std::vector<std::pair<std::string, std::string>> markdownFiles();
 
 /// Manual pages by file name, in troff.
 std::vector<std::pair<std::string, std::string>> manualFiles();
 
-/// Completion for bash, zsh and fish, each by its place below `share`.
+/// Completion for bash, zsh and fish, each by its path below `share`.
 std::vector<std::pair<std::string, std::string>> completionFiles();
 
 }  // namespace vdbdither

@@ -1,25 +1,8 @@
 #include "vdbdither/engine/window.h"
 
-#include <algorithm>
-
 #include "vdbdither/model/layers.h"
 
 namespace vdbdither {
-
-Reach widest(const std::vector<Read>& reads) {
-  Reach reach;
-  for (const Read& read : reads) {
-    reach.below = std::max(reach.below, read.reach.below);
-    reach.above = std::max(reach.above, read.reach.above);
-    reach.whole |= read.reach.whole;
-  }
-  return reach;
-}
-
-ZRange reached(ZRange core, const Reach& reach, ZRange layers) {
-  if (reach.whole) return layers;
-  return intersection({core.begin - reach.below, core.end + reach.above}, layers);
-}
 
 Slab cutTo(const Slab& slab, ZRange core) {
   if (core == slab.core) return slab;
@@ -31,8 +14,7 @@ Slab cutTo(const Slab& slab, ZRange core) {
   return cut;
 }
 
-Window::Window(std::vector<Read> reads, ZRange layers, ZRange cores,
-               std::set<std::string, std::less<>> passing)
+Window::Window(std::vector<Read> reads, ZRange layers, ZRange cores, GridNames passing)
     : reads_(std::move(reads)),
       layers_(layers),
       cores_(cores),

@@ -1,24 +1,23 @@
 #pragma once
 
 #include <deque>
-#include <set>
-#include <string>
 #include <vector>
 
-#include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/reach.h"
 #include "vdbdither/model/slab.h"
 
 namespace vdbdither {
 
-/// Stands in front of a filter: keeps the slabs that the filter's reach still needs and hands out
-/// each core with its halo as soon as the layers above have come. A barrier gets all layers in one.
+/// Stands in front of a filter: keeps the slabs that the filter's reach still needs and gives out
+/// each core with its halo as soon as the layers above have come. A barrier gets all layers at
+/// once.
 class Window {
  public:
-  /// `reads`: the grids the filter reads, each once; `layers`: all layers that will come; `cores`:
-  /// the layers whose cores are to be handed out (multiples of eight, or cut at the end of
-  /// `layers`); `passing`: the grids that are to pass the filter by.
-  Window(std::vector<Read> reads, ZRange layers, ZRange cores,
-         std::set<std::string, std::less<>> passing);
+  /// \param reads    the grids the filter reads, each once
+  /// \param layers   all layers that will come
+  /// \param cores    those to be given out as cores: multiples of 8, or cut at the end of `layers`
+  /// \param passing  the grids that pass the filter by
+  Window(std::vector<Read> reads, ZRange layers, ZRange cores, GridNames passing);
 
   struct Task {
     Slab input;    ///< the core with its halo: what the filter reads
@@ -38,17 +37,11 @@ class Window {
   std::vector<Read> reads_;
   ZRange layers_;
   ZRange cores_;
-  std::set<std::string, std::less<>> passing_;
+  GridNames passing_;
   Reach reach_;  ///< the widest of `reads_`
   std::deque<Slab> slabs_;
-  std::size_t next_ = 0;  ///< the first of `slabs_` that was not handed out
+  std::size_t next_ = 0;  ///< the first of `slabs_` that was not given out
 };
-
-/// The widest of the reaches.
-Reach widest(const std::vector<Read>& reads);
-
-/// `core` and what `reach` adds to it, cut at `layers`.
-ZRange reached(ZRange core, const Reach& reach, ZRange layers);
 
 /// The part of `slab` in `core`, which lies within slab.core.
 Slab cutTo(const Slab& slab, ZRange core);

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <unistd.h>
 
+#include "io/file/standard_streams.h"
+
 namespace vdbdither {
 
 namespace {
@@ -28,7 +30,7 @@ void Console::begin(bool quiet, double box_voxels, double expected_seconds) {
   box_voxels_ = box_voxels;
   expected_seconds_ = expected_seconds;
   start_ = last_ = Clock::now();
-  // The first word of a stage may take its time.
+  // The first progress of a stage may take a while to come.
   if (terminal_ && expected_seconds >= 1) {
     std::fprintf(stderr, "\r\033[K%-16s   0 %%  about %s left", "",
                  clockText(expected_seconds).c_str());
@@ -37,18 +39,18 @@ void Console::begin(bool quiet, double box_voxels, double expected_seconds) {
   }
 }
 
-void Console::warn(const std::string& stage, const std::string& text) {
+void Console::warn(const std::string& verb, const std::string& text) {
   clear();
-  std::fprintf(stderr, "vdbdither %s: warning: %s\n", stage.c_str(), text.c_str());
+  std::fprintf(stderr, "vdbdither %s: warning: %s\n", verb.c_str(), text.c_str());
 }
 
-void Console::progress(const std::string& stage, int done, int total, double fraction) {
+void Console::progress(const std::string& verb, int done, int total, double fraction) {
   const Clock::time_point now = Clock::now();
   if (!terminal_ || now - last_ < std::chrono::milliseconds(100)) return;
   last_ = now;
   const double share = done == 0 || total == 0 ? fraction : static_cast<double>(done) / total;
   const double seconds = std::chrono::duration<double>(now - start_).count();
-  std::fprintf(stderr, "\r\033[K%-16s %3d %%", stage.c_str(), static_cast<int>(100 * share));
+  std::fprintf(stderr, "\r\033[K%-16s %3d %%", verb.c_str(), static_cast<int>(100 * share));
   if (done > 0 && share > 0) {
     std::fprintf(stderr, "  %.0f Mvoxel/s  %s left", share * box_voxels_ / seconds / 1e6,
                  clockText(seconds * (1 - share) / share).c_str());
@@ -57,6 +59,15 @@ void Console::progress(const std::string& stage, int done, int total, double fra
   }
   std::fflush(stderr);
   shown_ = true;
+}
+
+void Console::print(const std::string& text) {
+  clear();
+  if (results_to_error_) {
+    std::fputs(text.c_str(), stderr);
+  } else {
+    printData(text.c_str());
+  }
 }
 
 void Console::clear() {

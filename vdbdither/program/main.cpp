@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -12,8 +13,10 @@
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/chain.h"
 #include "vdbdither/engine/manual.h"
+#include "vdbdither/engine/named_file.h"
 #include "vdbdither/engine/pipeline.h"
 #include "vdbdither/engine/registry.h"
+#include "vdbdither/engine/tool_run.h"
 #include "vdbdither/engine/version.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
@@ -22,34 +25,16 @@
 namespace vdbdither {
 namespace {
 
-/// What `help` says of a verb, or of all.
+using Clock = std::chrono::steady_clock;
+
+/// The text of `help` for a verb, or for all.
 std::string helpOn(const std::string& verb) {
   if (verb == "all") return listing();
   if (const ToolInfo* tool = findTool(verb)) return helpText(pageOf(*tool));
   return helpText(pageOf(findOperator(verb)));
 }
 
-bool asksForHelp(const std::vector<std::string>& words) {
-  return std::any_of(words.begin(), words.end(),
-                     [](const std::string& word) { return word == "--help" || word == "-h"; });
-}
-
-void runTool(const ToolInfo& info, const std::vector<std::string>& arguments) {
-  if (asksForHelp(arguments)) return printData(helpText(pageOf(info)).c_str());
-  try {
-    const std::unique_ptr<Tool> tool = info.make();
-    Options options;
-    tool->declare(options);
-    options.parse(arguments);
-    tool->run();
-  } catch (const UsageError& error) {
-    throw UsageError(std::string(info.name) + ": " + error.what());
-  } catch (const DataError& error) {
-    throw DataError(std::string(info.name) + ": " + error.what());
-  }
-}
-
-/// Whether a word that is no operator was rather meant to be a command.
+/// Refuses a word that is no operator but close to the name of a tool.
 void refuseNearTool(const std::string& word) {
   std::vector<std::string> names;
   for (const OperatorInfo* info : registeredOperators()) names.emplace_back(info->name);
@@ -58,11 +43,11 @@ void refuseNearTool(const std::string& word) {
   }
   const std::string near = nearestWord(word, names);
   if (word != near && findTool(near))
-    throw UsageError("no operator or command '" + word + "'; did you mean '" + near + "'?");
+    throw UsageError("no operator or tool '" + word + "'; did you mean '" + near + "'?");
 }
 
-/// The words of the chain: the arguments themselves, or the line after `run`; behind a link named
-/// like an operator, that operator first.
+/// The words of the chain: the arguments themselves, or the line after `run`. If the program was
+/// called through a link named like an operator, that operator comes first.
 std::vector<std::string> chainWords(int argc, char** argv) {
   std::vector<std::string> words(argv + 1, argv + argc);
   const std::string called = std::filesystem::path(argv[0]).filename();
@@ -71,21 +56,23 @@ std::vector<std::string> chainWords(int argc, char** argv) {
   }
   if (!words.empty() && words.front() == "run") {
     if (words.size() != 2) throw UsageError("run: takes one argument, the chain in quotes");
-    return splitWords(words[1]);
+    std::vector<std::string> chain = splitWords(words[1]);
+    if (chain.empty()) throw UsageError("run: the chain is empty");
+    return chain;
   }
   return words;
 }
 
-std::string reportJson(const Pipeline& pipeline, double seconds) {
+std::string reportJson(const JobReport& report, double seconds) {
   nlohmann::ordered_json json;
   json["version"] = version;
   json["seconds"] = seconds;
-  if (const auto expected = pipeline.expectedSeconds()) json["expected_seconds"] = *expected;
-  json["layers"] = pipeline.layers();
-  json["box_voxels"] = pipeline.boxVoxels();
+  if (report.expected_seconds) json["expected_seconds"] = *report.expected_seconds;
+  json["layers"] = report.layers;
+  json["box_voxels"] = report.box_voxels;
   json["peak_memory_bytes"] = peakMemoryBytes();
   json["stages"] = nlohmann::ordered_json::array();
-  for (const StageReport& stage : pipeline.reports()) {
+  for (const StageReport& stage : report.stages) {
     nlohmann::ordered_json entry{{"name", stage.name},
                                  {"seconds", stage.seconds},
                                  {"cpu_seconds", stage.cpu_seconds},
@@ -99,8 +86,8 @@ std::string reportJson(const Pipeline& pipeline, double seconds) {
   return json.dump() + "\n";
 }
 
-void printStages(const Pipeline& pipeline, double seconds) {
-  for (const StageReport& stage : pipeline.reports()) {
+void printStages(const JobReport& report, double seconds) {
+  for (const StageReport& stage : report.stages) {
     std::fprintf(stderr, "%-16s %8.2f s  %12.0f voxels  %8s out  %8s peak", stage.name.c_str(),
                  stage.seconds, stage.active_voxels, bytesText(stage.bytes).c_str(),
                  bytesText(stage.peak_memory_bytes).c_str());
@@ -110,74 +97,73 @@ void printStages(const Pipeline& pipeline, double seconds) {
     std::fputc('\n', stderr);
   }
   std::fprintf(stderr, "%-16s %8.2f s  %8.0f Mvoxel/s of the box\n", "all", seconds,
-               pipeline.boxVoxels() / seconds / 1e6);
+               report.box_voxels / seconds / 1e6);
 }
 
-/// The console of the program: what operators tell goes to standard output, or to standard error
-/// where that carries voxels.
-class ProgramConsole : public Console {
- public:
-  explicit ProgramConsole(bool voxels_on_output) : voxels_on_output_(voxels_on_output) {}
-  void print(const std::string& text) override {
-    clear();
-    if (voxels_on_output_) {
-      std::fputs(text.c_str(), stderr);
-    } else {
-      printData(text.c_str());
-    }
-  }
-
- private:
-  bool voxels_on_output_;
-};
-
-void runChain(const std::vector<std::string>& words) {
-  Pipeline pipeline(parseChain(words));
-  const RunOptions& options = pipeline.options();
-  if (const OperatorInfo* info = pipeline.helpWanted())
-    return printData(helpText(pageOf(*info)).c_str());
-  ProgramConsole console(pipeline.writesToStandardOutput());
-  console.begin(options.quiet, 0, 0);
-  const auto start = std::chrono::steady_clock::now();
-  pipeline.plan(console);
-  if (options.explain) {
-    printData(pipeline.explanation().c_str());
-    return pipeline.drain();
-  }
-  console.begin(options.quiet || options.verbose, pipeline.boxVoxels(),
-                pipeline.expectedSeconds().value_or(0));
+/// Runs `job`, a Pipeline or a ToolRun, by `function` and reports what it did.
+template <typename Job, typename Function>
+void runReported(Job& job, Console& console, Clock::time_point start, const Function& function) {
   try {
-    pipeline.run();
+    function();
   } catch (...) {
     console.clear();
     throw;
   }
   console.clear();
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (options.verbose) printStages(pipeline, seconds);
-  if (options.json) console.print(reportJson(pipeline, seconds));
+  const RunOptions& options = job.options();
+  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  if (options.verbose) printStages(job.report(), seconds);
+  if (options.json) console.print(reportJson(job.report(), seconds));
+}
+
+void runTool(ToolRun&& tool) {
+  const Clock::time_point start = Clock::now();
+  Console console;
+  console.begin(tool.options().quiet || tool.options().verbose, 0, 0);
+  runReported(tool, console, start, [&] { tool.run(console); });
+}
+
+void runChain(const std::vector<Step>& steps) {
+  Pipeline pipeline(steps);
+  const RunOptions& options = pipeline.options();
+  if (const OperatorInfo* info = pipeline.helpWanted())
+    return printData(helpText(pageOf(*info)).c_str());
+  const Clock::time_point start = Clock::now();
+  Console console;
+  console.begin(options.quiet, 0, 0);
+  const JobPlan& plan = pipeline.plan(console);
+  if (options.explain) {
+    printData((options.json ? toJson(plan) : toText(plan)).c_str());
+    return pipeline.readInputsToEnd();
+  }
+  console.keepStandardOutputFree(plan.writesToStandardOutput());
+  console.begin(options.quiet || options.verbose, plan.boxVoxels(), plan.seconds.value_or(0));
+  runReported(pipeline, console, start, [&] { pipeline.run(); });
 }
 
 void runProgram(int argc, char** argv) {
   const std::vector<std::string> words = chainWords(argc, argv);
-  if (words.empty()) {
-    std::fputs(overview().c_str(), stderr);
-    throw UsageError("there is no operator");
-  }
+  if (words.empty()) return printData(overview().c_str());
   if (std::find(words.begin(), words.end(), "--version") != words.end())
     return printData((std::string("vdbdither ") + version + "\n").c_str());
   if (words.front() == "--help" || words.front() == "-h" || words.front() == "help") {
     return printData(words.size() > 1 ? helpOn(words[1]).c_str() : overview().c_str());
   }
-  if (const ToolInfo* tool = findTool(words.front()))
-    return runTool(*tool, {words.begin() + 1, words.end()});
+  if (const ToolInfo* tool = findTool(words.front())) {
+    const std::vector<std::string> arguments(words.begin() + 1, words.end());
+    if (asksForHelp(arguments)) return printData(helpText(pageOf(*tool)).c_str());
+    return runTool({*tool, arguments});
+  }
   refuseNearTool(words.front());
-  runChain(words);
+  const std::vector<Step> steps = parseChain(words);
+  const OperatorInfo& info = findOperator(steps.front().verb);
+  if (steps.size() == 1 && worksOnFile(info, steps.front().arguments))
+    return runTool({info, steps.front().arguments});
+  runChain(steps);
 }
 
-/// Whether a message begins with the stage that it is about.
-bool namesItsStage(const std::string& message) {
+/// Whether a message begins with the verb that it is about.
+bool namesItsVerb(const std::string& message) {
   const std::string first = message.substr(0, message.find(": "));
   const auto operators = registeredOperators();
   return findTool(first) || first == "run" ||
@@ -187,11 +173,11 @@ bool namesItsStage(const std::string& message) {
 
 int guardedMain(int argc, char** argv) {
   const auto fail = [](const char* message, int code) {
-    std::fprintf(stderr, "vdbdither%s %s\n", namesItsStage(message) ? "" : ":", message);
+    std::fprintf(stderr, "vdbdither%s %s\n", namesItsVerb(message) ? "" : ":", message);
     return code;
   };
-  // What one slab frees the next one wants again: giving it back to the system in between takes
-  // twice the system time.
+  // The next slab needs what one slab frees: returning it to the system in between doubles the
+  // system time.
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
   try {
     setStandardOutputAside();

@@ -13,9 +13,6 @@ struct Taubin {
   double lambda = 0.5;
   double mu = -0.53;
   int iterations = 160;
-
-  /// About what `smooth` takes, as CPU time of one thread for every vertex.
-  [[nodiscard]] double usPerVertex() const { return 0.25 + 0.022 * iterations; }
 };
 
 /// Smooths a closed mesh whose sides are each met by exactly one other in the opposite direction.

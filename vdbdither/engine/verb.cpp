@@ -1,4 +1,4 @@
-#include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/verb.h"
 
 namespace vdbdither {
 
@@ -13,7 +13,7 @@ class SilentReporter : public Reporter {
 
 }  // namespace
 
-Reporter& Operator::report() const {
+Reporter& Verb::report() const {
   static SilentReporter silent;
   return reporter_ ? *reporter_ : silent;
 }

@@ -1,0 +1,155 @@
+#include "vdbdither/engine/planning.h"
+
+#include <algorithm>
+#include <sstream>
+
+#include <tbb/task_arena.h>
+
+#include "vdbdither/model/errors.h"
+
+namespace vdbdither {
+
+namespace {
+
+using Kind = StagePlan::Kind;
+
+constexpr int tallest_auto_slab = 64;
+
+/// `text` is A:B, counted from the first of `all`, or empty for all of them.
+ZRange parseLayers(const std::string& text, ZRange all) {
+  if (text.empty()) return all;
+  ZRange range;
+  char colon = 0;
+  std::istringstream stream(text);
+  if (!(stream >> range.begin >> colon >> range.end) || colon != ':' || !stream.eof() ||
+      range.begin < 0 || range.empty() || range.end > all.size()) {
+    throw UsageError("--layers: '" + text +
+                     "' is not A:B with 0 <= A < B <= " + std::to_string(all.size()));
+  }
+  return {all.begin + range.begin, all.begin + range.end};
+}
+
+int threadsOf(const RunOptions& options) {
+  const int all = tbb::this_task_arena::max_concurrency();
+  return options.threads > 0 ? std::min(options.threads, all) : all;
+}
+
+void refuseBarriers(const JobPlan& plan) {
+  for (const StagePlan& stage : plan.stages) {
+    if (stage.is_barrier)
+      throw UsageError(stage.name + ": needs the whole volume at once, which --stream forbids");
+  }
+}
+
+/// A stage hands on the grids that a later stage reads.
+void planGrids(JobPlan& plan) {
+  GridNames needed;
+  for (auto stage = plan.stages.rbegin(); stage != plan.stages.rend(); ++stage) {
+    stage->handed_on = needed;
+    for (const Read& read : stage->reads) needed.insert(read.grid);
+  }
+}
+
+/// From the end to the source: a stage gives what the stages behind it need, in whole leaves.
+void planCores(JobPlan& plan) {
+  ZRange need = plan.layers;
+  for (auto stage = plan.stages.rbegin(); stage != plan.stages.rend(); ++stage) {
+    stage->cores = plan.layers;
+    if (stage->kind == Kind::sink) continue;
+    const ZRange all = stage->schema.lattice.layers();
+    stage->cores = intersection(alignedToLeaves(need), all);
+    if (stage->kind == Kind::filter) need = reached(stage->cores, widest(stage->reads), all);
+  }
+}
+
+/// From the source to the end: the layers that a filter's window holds. A filter that enlarges the
+/// box has layers there that no stage makes: they are empty.
+void planWindows(JobPlan& plan) {
+  ZRange incoming = plan.stages.front().cores;
+  for (StagePlan& stage : plan.stages) {
+    if (stage.kind != Kind::filter) continue;
+    stage.incoming = stage.window = incoming;
+    if (incoming.empty()) {
+      stage.window = stage.cores;
+    } else if (!stage.cores.empty()) {
+      stage.window = {std::min(incoming.begin, stage.cores.begin),
+                      std::max(incoming.end, stage.cores.end)};
+    }
+    incoming = stage.cores;
+  }
+}
+
+void planSlabs(JobPlan& plan, const RunOptions& options) {
+  plan.memory_limit_bytes =
+      options.memory == "auto" ? freeMemoryBytes() : parseBytes(options.memory);
+  if (options.slab == "all") {
+    plan.slab_layers = alignedToLeaves(plan.stages.front().cores).size();
+  } else if (options.slab == "auto") {
+    plan.slab_layers = tallest_auto_slab;
+    while (plan.slab_layers > leaf_layers &&
+           memoryBytes(plan, plan.slab_layers) > plan.memory_limit_bytes)
+      plan.slab_layers /= 2;
+  } else {
+    std::istringstream stream(options.slab);
+    if (!(stream >> plan.slab_layers) || !stream.eof() || plan.slab_layers < leaf_layers ||
+        plan.slab_layers % leaf_layers != 0) {
+      throw UsageError("--slab: '" + options.slab + "' is not a multiple of 8, auto or all");
+    }
+  }
+  plan.memory_bytes = memoryBytes(plan, plan.slab_layers);
+  if (plan.memory_bytes > plan.memory_limit_bytes && !options.explain) {
+    throw DataError("the job needs about " + bytesText(plan.memory_bytes) +
+                    " of memory and may use " + bytesText(plan.memory_limit_bytes) +
+                    "; use a smaller --slab, fewer --layers, or more --memory");
+  }
+}
+
+void planOutputs(JobPlan& plan, const RunOptions& options) {
+  for (StagePlan& stage : plan.stages) {
+    OutputEstimate& output = stage.output;
+    if (output.path.empty() || output.path == "-") continue;
+    const int all = stage.schema.lattice.layers().size();
+    if (all > 0) output.bytes *= static_cast<double>(plan.layers.size()) / all;
+    stage.free_disk_bytes = freeDiskBytes(output.path);
+    if (output.bytes > stage.free_disk_bytes && !options.explain) {
+      throw DataError(stage.name + ": '" + output.path + "' needs about " +
+                      bytesText(output.bytes) + ", and its disk has " +
+                      bytesText(stage.free_disk_bytes) +
+                      " left; choose another place, or fewer --layers");
+    }
+  }
+}
+
+void planTime(JobPlan& plan) {
+  const StagePlan* before = &plan.stages.front();
+  for (StagePlan& stage : plan.stages) {
+    if (stage.work) {
+      const Schema& through = before->schema;
+      stage.cpu_seconds = cpuSeconds(*stage.work, through.footprint, stage.cores.size(),
+                                     through.lattice.layers().size());
+    }
+    before = &stage;
+  }
+  plan.seconds = secondsOf(plan);
+}
+
+}  // namespace
+
+JobPlan planJob(std::span<const std::unique_ptr<Stage>> stages, const RunOptions& options) {
+  JobPlan plan;
+  plan.threads = threadsOf(options);
+  const Schema nothing;
+  for (const auto& stage : stages)
+    plan.stages.push_back(stage->plan(plan.stages.empty() ? nothing : plan.stages.back().schema));
+  if (options.stream) refuseBarriers(plan);
+  plan.layers = parseLayers(options.layers, plan.lattice().layers());
+  planGrids(plan);
+  planCores(plan);
+  planWindows(plan);
+  planSlabs(plan, options);
+  planOutputs(plan, options);
+  planTime(plan);
+  return plan;
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "vdbdither/engine/job_plan.h"
+#include "vdbdither/engine/run_options.h"
+#include "vdbdither/engine/stage.h"
+
+namespace vdbdither {
+
+/// Plans a chain without computing a voxel: asks the operators in order, then works out from the
+/// end which grids and layers each stage must give, chooses the height of the slabs, and estimates
+/// memory, time and disk. Throws UsageError or DataError for everything that can be refused now; a
+/// job that does not fit into memory or onto the disk is refused unless `options.explain` is set.
+JobPlan planJob(std::span<const std::unique_ptr<Stage>> stages, const RunOptions& options);
+
+}  // namespace vdbdither
