@@ -16,6 +16,8 @@ namespace vdbdither {
 ///
 /// d′ is a distance where h is constant: exact outside of what grows, and, behind the re-entrant
 /// edges that growing makes, too small as that of a union. Where h varies, |∇d′| is √(1 + |∇h|²).
+/// A centre on a surface moved by a constant is inside where d′ falls towards the point shifted by
+/// (ε, ε³, ε²).
 struct SurfaceOffset {
   enum class At {
     closest,  ///< the closest surface voxel v̄: a column of voxels shares one height
