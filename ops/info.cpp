@@ -300,7 +300,7 @@ class InfoFile : public Tool {
   }
 
   void declare(Options& options) override {
-    options.positional("file", path_, "The .vdb to describe, if there is no chain", false);
+    options.positional("file", path_, "The .vdb to describe if there is no chain", false);
     json_.declare(options);
   }
 

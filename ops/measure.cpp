@@ -177,7 +177,7 @@ class SurfaceMeasurement {
     readReference(lattice, reporter);
   }
 
-  [[nodiscard]] const std::optional<std::string>& grid() const { return surface_grid_.grid; }
+  [[nodiscard]] const SurfaceGridOption& surfaceGrid() const { return surface_grid_; }
   [[nodiscard]] bool smooths() const { return smoothing_.smoothing != Smoothing::none; }
 
   [[nodiscard]] Work work(const Lattice& lattice) const {
@@ -202,7 +202,7 @@ class SurfaceMeasurement {
   void finish(Mesh mesh, const std::string& of, const Lattice* lattice, VoxelComponents* components,
               Reporter& reporter) const {
     const auto progress = [&](double fraction) { reporter.progress(fraction); };
-    if (smooths()) smooth(mesh, taubin(), progress);
+    if (smooths()) smooth(mesh, {.iterations = smoothing_.iterations}, progress);
     const SurfaceErrors errors = surfaceErrors(mesh, *reference_, spacing_mm_, progress);
     const ordered_json all = figures(errors, mesh, of, lattice, components);
     for (const char* name :
@@ -226,8 +226,6 @@ class SurfaceMeasurement {
   }
 
  private:
-  [[nodiscard]] Taubin taubin() const { return {.iterations = smoothing_.iterations}; }
-
   void readReference(const Lattice* lattice, Reporter& reporter) {
     Mesh mesh = readMesh(reference_file_, [&](const std::string& text) { reporter.warn(text); });
     const MeshPlacementOptions& given = placement_;
@@ -316,7 +314,7 @@ class Measure : public Sink {
   void plan(const Schema& in) override {
     std::vector<std::string> there;
     for (const auto& [name, grid] : in.grids) there.push_back(name);
-    name_ = chosenSurfaceGrid(there, measurement_.grid());
+    name_ = chosenSurfaceGrid(there, measurement_.surfaceGrid().grid);
     lattice_ = in.lattice;
     surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
     components_.emplace(surface_->frame());
@@ -364,8 +362,8 @@ class MeasureMesh : public Tool {
   static bool takes(const std::string& file) { return !file.ends_with(".vdb"); }
 
   void declare(Options& options) override {
-    options.positional("mesh", file_,
-                       "A mesh to measure, if there is no chain: " + meshFormatNames(), false);
+    options.positional("mesh", file_, "Mesh to measure if there is no chain: " + meshFormatNames(),
+                       false);
     measurement_.declare(options);
   }
 

@@ -88,7 +88,7 @@ class SurfacePicture {
     if (!frame_file_.empty()) frame(camera_, readMeshOf(frame_file_, reporter), margin_);
   }
 
-  [[nodiscard]] const std::optional<std::string>& grid() const { return surface_grid_.grid; }
+  [[nodiscard]] const SurfaceGridOption& surfaceGrid() const { return surface_grid_; }
   [[nodiscard]] bool drawsBlocks() const { return blocks_; }
 
   [[nodiscard]] std::optional<Work> work(const Lattice& lattice) const {
@@ -189,7 +189,7 @@ class Render : public Sink {
   void plan(const Schema& in) override {
     std::vector<std::string> there;
     for (const auto& [name, grid] : in.grids) there.push_back(name);
-    name_ = chosenSurfaceGrid(there, picture_.grid());
+    name_ = chosenSurfaceGrid(there, picture_.surfaceGrid().grid);
     lattice_ = in.lattice;
     surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
     if (picture_.drawsBlocks()) faces_.emplace(in.lattice);
@@ -239,7 +239,7 @@ class RenderMesh : public Tool {
   static bool takes(const std::string& file) { return !file.ends_with(".vdb"); }
 
   void declare(Options& options) override {
-    options.positional("mesh", file_, "A mesh to draw, if there is no chain: " + meshFormatNames(),
+    options.positional("mesh", file_, "Mesh to draw if there is no chain: " + meshFormatNames(),
                        false);
     picture_.declare(options);
   }

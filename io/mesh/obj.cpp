@@ -149,10 +149,7 @@ const MeshFormat obj{.name = "OBJ",
                      .ending = ".obj",
                      .match = matchObj,
                      .read = readObj,
-                     .write = [](const std::filesystem::path& path,
-                                 const VertexExtras&) -> std::unique_ptr<MeshEncoder> {
-                       return std::make_unique<ObjEncoder>(path);
-                     },
+                     .write = makeMeshEncoder<ObjEncoder>,
                      .bytes_per_vertex = 74,
                      .us_per_vertex = 0.55};
 

@@ -478,10 +478,7 @@ const MeshFormat ply{.name = "PLY",
                      .ending = ".ply",
                      .match = matchPly,
                      .read = readPly,
-                     .write = [](const std::filesystem::path& path,
-                                 const VertexExtras& extras) -> std::unique_ptr<MeshEncoder> {
-                       return std::make_unique<PlyEncoder>(path, extras);
-                     },
+                     .write = makeMeshEncoder<PlyEncoder>,
                      .holds_extras = true,
                      .most = std::numeric_limits<std::int32_t>::max(),
                      .bytes_per_vertex = 38,

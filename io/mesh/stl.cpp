@@ -303,10 +303,7 @@ const MeshFormat stl{.name = "STL",
                      .ending = ".stl",
                      .match = matchStl,
                      .read = readStl,
-                     .write = [](const std::filesystem::path& path,
-                                 const VertexExtras&) -> std::unique_ptr<MeshEncoder> {
-                       return std::make_unique<StlEncoder>(path);
-                     },
+                     .write = makeMeshEncoder<StlEncoder>,
                      .most = std::numeric_limits<std::uint32_t>::max(),
                      .bytes_per_vertex = 100,
                      .us_per_vertex = 0.2};

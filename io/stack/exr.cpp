@@ -104,12 +104,11 @@ RunImage decodeMaterials(std::span<const std::uint8_t> bytes) {
 }  // namespace
 
 extern const SliceFormat exr;
-const SliceFormat exr{
-    .name = "exr",
-    .summary = "Material index, and distance and normal where there are any",
-    .pixel = SlicePixel::index,
-    .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<ExrSlices>(); },
-    .decode = decodeMaterials,
-    .bytes_per_leaf = 1300};
+const SliceFormat exr{.name = "exr",
+                      .summary = "Material index, and distance and normal where there are any",
+                      .pixel = SlicePixel::index,
+                      .encoder = makeSliceEncoder<ExrSlices>,
+                      .decode = decodeMaterials,
+                      .bytes_per_leaf = 1300};
 
 }  // namespace vdbdither

@@ -18,13 +18,12 @@ class PngSlices : public SliceEncoder {
 }  // namespace
 
 extern const SliceFormat png;
-const SliceFormat png{
-    .name = "png",
-    .summary = "32-bit RGBA in the colours of the materials",
-    .pixel = SlicePixel::colour,
-    .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<PngSlices>(); },
-    .decode = decodePng,
-    .decodes_colours = true,
-    .bytes_per_leaf = 125};
+const SliceFormat png{.name = "png",
+                      .summary = "32-bit RGBA in the colours of the materials",
+                      .pixel = SlicePixel::colour,
+                      .encoder = makeSliceEncoder<PngSlices>,
+                      .decode = decodePng,
+                      .decodes_colours = true,
+                      .bytes_per_leaf = 125};
 
 }  // namespace vdbdither

@@ -20,13 +20,12 @@ class BitPngSlices : public SliceEncoder {
 }  // namespace
 
 extern const SliceFormat png1;
-const SliceFormat png1{
-    .name = "png1",
-    .summary = "For each material a folder of slices with 1 bit per voxel",
-    .pixel = SlicePixel::one_material,
-    .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<BitPngSlices>(); },
-    .decode = decodePng,
-    .decodes_colours = true,
-    .bytes_per_leaf = 80};
+const SliceFormat png1{.name = "png1",
+                       .summary = "For each material a folder of slices with 1 bit per voxel",
+                       .pixel = SlicePixel::one_material,
+                       .encoder = makeSliceEncoder<BitPngSlices>,
+                       .decode = decodePng,
+                       .decodes_colours = true,
+                       .bytes_per_leaf = 80};
 
 }  // namespace vdbdither

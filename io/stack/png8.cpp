@@ -19,13 +19,12 @@ class GreyPngSlices : public SliceEncoder {
 }  // namespace
 
 extern const SliceFormat png8;
-const SliceFormat png8{
-    .name = "png8",
-    .summary = "Grey: 255 where printed, else 0",
-    .pixel = SlicePixel::printed,
-    .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<GreyPngSlices>(); },
-    .decode = decodePng,
-    .decodes_colours = true,
-    .bytes_per_leaf = 80};
+const SliceFormat png8{.name = "png8",
+                       .summary = "Grey: 255 where printed, else 0",
+                       .pixel = SlicePixel::printed,
+                       .encoder = makeSliceEncoder<GreyPngSlices>,
+                       .decode = decodePng,
+                       .decodes_colours = true,
+                       .bytes_per_leaf = 80};
 
 }  // namespace vdbdither

@@ -97,14 +97,20 @@ void StackPreview::look(const RunImage& slice, Hit* hits) {
   }
 }
 
-std::vector<StackPreview::Pixel> StackPreview::front() const {
+/// What a pixel of the front view shows.
+struct StackPreview::Surface {
+  float depth_mm = 0;
+  float cover = 0;
+  Pixel colour{0, 0, 0};
+};
+
+double StackPreview::stepMm() const {
+  return std::max({pitch_mm_.x(), pitch_mm_.y(), pitch_mm_.z(), pixel_mm_});
+}
+
+std::vector<StackPreview::Surface> StackPreview::surfaces() const {
   const int rays = columns_ * fineness;
-  const double step_mm = std::max({pitch_mm_.x(), pitch_mm_.y(), pitch_mm_.z(), pixel_mm_});
-  struct Surface {
-    float depth_mm = 0;
-    float cover = 0;
-    Pixel colour{0, 0, 0};
-  };
+  const double step_mm = stepMm();
   std::vector<Surface> surface(static_cast<std::size_t>(columns_) * front_rows_);
   for (int row = 0; row < front_rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
@@ -138,55 +144,62 @@ std::vector<StackPreview::Pixel> StackPreview::front() const {
       pixel.cover /= fineness * fineness;
     }
   }
+  return surface;
+}
 
-  // The surface is a staircase of voxels: its slope is that of a plane fitted to the pixels around
-  // that belong to it.
-  const int radius = std::clamp(static_cast<int>(std::ceil(2 * step_mm / pixel_mm_)), 2, 8);
+std::vector<StackPreview::Pixel> StackPreview::front() const {
+  const std::vector<Surface> surface = surfaces();
   std::vector<Pixel> result(surface.size());
   tbb::parallel_for(0, front_rows_, [&](int row) {
     for (int column = 0; column < columns_; ++column) {
-      const Surface& here = surface[static_cast<std::size_t>(row) * columns_ + column];
-      Pixel& out = result[static_cast<std::size_t>(row) * columns_ + column];
-      out = {background[0], background[1], background[2]};
-      if (here.cover <= 0) continue;
-      double n = 0, x = 0, z = 0, d = 0, xx = 0, xz = 0, zz = 0, xd = 0, zd = 0;
-      for (int v = std::max(-radius, -row); v <= std::min(radius, front_rows_ - 1 - row); ++v) {
-        for (int u = std::max(-radius, -column); u <= std::min(radius, columns_ - 1 - column);
-             ++u) {
-          const Surface& near = surface[static_cast<std::size_t>(row + v) * columns_ + column + u];
-          const double depth = near.depth_mm - here.depth_mm;
-          const double distance = std::sqrt(u * u + v * v);
-          if (near.cover <= 0 || distance > radius ||
-              std::abs(depth) > 4 * pixel_mm_ * distance + 2 * step_mm)
-            continue;
-          const double weight = near.cover * (radius + 1 - distance);
-          n += weight, x += weight * u, z -= weight * v, d += weight * depth;
-          xx += weight * u * u, xz -= weight * u * v, zz += weight * v * v;
-          xd += weight * u * depth, zd -= weight * v * depth;
-        }
-      }
-      xx -= x * x / n, xz -= x * z / n, zz -= z * z / n, xd -= x * d / n, zd -= z * d / n;
-      const double determinant = xx * zz - xz * xz;
-      double slope_x = 0;
-      double slope_z = 0;
-      if (determinant > 1e-6 * n * n) {
-        slope_x = (xd * zz - zd * xz) / determinant / pixel_mm_;
-        slope_z = (zd * xx - xd * xz) / determinant / pixel_mm_;
-      }
-      // Outward normal (slope_x, -1, slope_z); a key light from the upper left in front, a fill
-      // from the right.
-      const double length = std::sqrt(slope_x * slope_x + 1 + slope_z * slope_z);
-      const double key = std::max(0.0, (-0.5 * slope_x + 0.62 + 0.605 * slope_z) / length);
-      const double fill = std::max(0.0, (0.8 * slope_x + 0.6) / length);
-      const auto light = static_cast<float>(std::min(1.0, 0.14 + 0.8 * key + 0.14 * fill));
-      const auto blend = [&](float colour, float behind) {
-        return behind + here.cover * ((8 + colour * 0.97F) * light - behind);
-      };
-      out = {blend(here.colour.red, background[0]), blend(here.colour.green, background[1]),
-             blend(here.colour.blue, background[2])};
+      result[static_cast<std::size_t>(row) * columns_ + column] = shaded(surface, row, column);
     }
   });
   return result;
+}
+
+StackPreview::Pixel StackPreview::shaded(const std::vector<Surface>& surface, int row,
+                                         int column) const {
+  const Surface& here = surface[static_cast<std::size_t>(row) * columns_ + column];
+  if (here.cover <= 0) return {background[0], background[1], background[2]};
+  // The surface is a staircase of voxels: its slope is that of a plane fitted to the pixels around
+  // that belong to it.
+  const double step_mm = stepMm();
+  const int radius = std::clamp(static_cast<int>(std::ceil(2 * step_mm / pixel_mm_)), 2, 8);
+  double n = 0, x = 0, z = 0, d = 0, xx = 0, xz = 0, zz = 0, xd = 0, zd = 0;
+  for (int v = std::max(-radius, -row); v <= std::min(radius, front_rows_ - 1 - row); ++v) {
+    for (int u = std::max(-radius, -column); u <= std::min(radius, columns_ - 1 - column); ++u) {
+      const Surface& near = surface[static_cast<std::size_t>(row + v) * columns_ + column + u];
+      const double depth = near.depth_mm - here.depth_mm;
+      const double distance = std::sqrt(u * u + v * v);
+      if (near.cover <= 0 || distance > radius ||
+          std::abs(depth) > 4 * pixel_mm_ * distance + 2 * step_mm)
+        continue;
+      const double weight = near.cover * (radius + 1 - distance);
+      n += weight, x += weight * u, z -= weight * v, d += weight * depth;
+      xx += weight * u * u, xz -= weight * u * v, zz += weight * v * v;
+      xd += weight * u * depth, zd -= weight * v * depth;
+    }
+  }
+  xx -= x * x / n, xz -= x * z / n, zz -= z * z / n, xd -= x * d / n, zd -= z * d / n;
+  const double determinant = xx * zz - xz * xz;
+  double slope_x = 0;
+  double slope_z = 0;
+  if (determinant > 1e-6 * n * n) {
+    slope_x = (xd * zz - zd * xz) / determinant / pixel_mm_;
+    slope_z = (zd * xx - xd * xz) / determinant / pixel_mm_;
+  }
+  // Outward normal (slope_x, -1, slope_z); a key light from the upper left in front, a fill
+  // from the right.
+  const double length = std::sqrt(slope_x * slope_x + 1 + slope_z * slope_z);
+  const double key = std::max(0.0, (-0.5 * slope_x + 0.62 + 0.605 * slope_z) / length);
+  const double fill = std::max(0.0, (0.8 * slope_x + 0.6) / length);
+  const auto light = static_cast<float>(std::min(1.0, 0.14 + 0.8 * key + 0.14 * fill));
+  const auto blend = [&](float colour, float behind) {
+    return behind + here.cover * ((8 + colour * 0.97F) * light - behind);
+  };
+  return {blend(here.colour.red, background[0]), blend(here.colour.green, background[1]),
+          blend(here.colour.blue, background[2])};
 }
 
 std::vector<StackPreview::Pixel> StackPreview::slice() const {

@@ -38,7 +38,13 @@ class StackPreview {
     float red, green, blue;
   };
 
+  struct Surface;
+
   void look(const RunImage& slice, Hit* hits);
+  /// The longest edge of a voxel, at least a pixel.
+  [[nodiscard]] double stepMm() const;
+  [[nodiscard]] std::vector<Surface> surfaces() const;
+  [[nodiscard]] Pixel shaded(const std::vector<Surface>& surface, int row, int column) const;
   [[nodiscard]] std::vector<Pixel> front() const;
   [[nodiscard]] std::vector<Pixel> slice() const;
 

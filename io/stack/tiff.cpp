@@ -18,13 +18,12 @@ class TiffSlices : public SliceEncoder {
 }  // namespace
 
 extern const SliceFormat tiff;
-const SliceFormat tiff{
-    .name = "tiff",
-    .summary = "A palette of the colours of the materials",
-    .pixel = SlicePixel::palette,
-    .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<TiffSlices>(); },
-    .decode = decodeTiff,
-    .bytes_per_leaf = 250,
-    .most_materials = 255};
+const SliceFormat tiff{.name = "tiff",
+                       .summary = "A palette of the colours of the materials",
+                       .pixel = SlicePixel::palette,
+                       .encoder = makeSliceEncoder<TiffSlices>,
+                       .decode = decodeTiff,
+                       .bytes_per_leaf = 250,
+                       .most_materials = 255};
 
 }  // namespace vdbdither

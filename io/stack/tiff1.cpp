@@ -23,12 +23,11 @@ class BitTiffSlices : public SliceEncoder {
 }  // namespace
 
 extern const SliceFormat tiff1;
-const SliceFormat tiff1{
-    .name = "tiff1",
-    .summary = "For each material a folder of slices with 1 bit per voxel",
-    .pixel = SlicePixel::one_material,
-    .encoder = []() -> std::unique_ptr<SliceEncoder> { return std::make_unique<BitTiffSlices>(); },
-    .decode = decodeTiff,
-    .bytes_per_leaf = 80};
+const SliceFormat tiff1{.name = "tiff1",
+                        .summary = "For each material a folder of slices with 1 bit per voxel",
+                        .pixel = SlicePixel::one_material,
+                        .encoder = makeSliceEncoder<BitTiffSlices>,
+                        .decode = decodeTiff,
+                        .bytes_per_leaf = 80};
 
 }  // namespace vdbdither

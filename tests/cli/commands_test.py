@@ -84,7 +84,7 @@ class Words(ProgramTest):
         self.assertEqual(plan["slab_layers"], 16)
         self.assertEqual([stage["name"] for stage in plan["stages"]], ["mesh2sdf", "dither", "slice-export"])
         source, dither, export = plan["stages"]
-        self.assertEqual(source["arguments"], f"part.stl {' '.join(MIMAKI)}")
+        self.assertIn(f"part.stl {' '.join(MIMAKI)}", source["arguments"])
         self.assertLess(source["layers"]["begin"], 8)
         self.assertGreater(source["layers"]["end"], 24)
         self.assertEqual(dither["reads"][0]["grid"], "surface")
@@ -243,9 +243,9 @@ class Refusals(ProgramTest):
         for text in ("5", "5:5", "9:2", "0:99999", "-1:4", "a:b", "1:2:3"):
             self.refuse(2, "is not A:B with 0 <= A < B <= ", *chain, f"--layers={text}")
         for text in ("0", "7", "-8", "many", "8x"):
-            self.refuse(2, "is not a multiple of 8, auto or all", *chain, f"--slab={text}")
-        for text in ("much", "-4GiB", "4 apples", "0"):
-            self.refuse(2, "is not a size such as 4GiB or 500MB", *chain, f"--memory={text}")
+            self.refuse(2, f"--slab: '{text}' is not accepted; the value must be a multiple of 8, auto or all", *chain, f"--slab={text}")
+        for text in ("much", "-4GiB", "4 apples", "0", "inf", "1e400GiB"):
+            self.refuse(2, f"--memory: '{text}' is not accepted; give a size such as 4GiB or 500MB, or auto", *chain, f"--memory={text}")
 
     def test_a_source_can_only_begin_a_chain(self):
         self.refuse(2, "can only begin a chain", "mesh2sdf", "part.stl", *MIMAKI, "!", "mask", "-o", "x.vdb")

@@ -62,9 +62,9 @@ class Inputs(ProgramTest):
     def test_what_cannot_be_the_input_is_refused(self):
         self.refuse(1, "read: no such file 'gone.vdb'", "normals", "gone.vdb", "-o", "x.vdb")
         self.refuse(1, "read: 'part.stl'", "normals", "part.stl", "-o", "x.vdb")
-        self.refuse(2, "normals: unexpected argument 'typo'", "normals", "typo", "-o", "x.vdb")
-        self.refuse(2, "normals: unexpected argument 'b.vdb'", "normals", "a.vdb", "b.vdb")
-        self.refuse(2, "slice-export: no folder is given", "slice-export", "a.vdb")
+        self.refuse(2, "normals: 'typo' is not expected", "normals", "typo", "-o", "x.vdb")
+        self.refuse(2, "normals: 'b.vdb' is not expected", "normals", "a.vdb", "b.vdb")
+        self.refuse(2, "slice-export: 'folder' is missing", "slice-export", "a.vdb")
         self.refuse(2, "--input: normals reads 'a.vdb'", "normals", "a.vdb", "-i", "a.vdb", "-o", "x.vdb")
         self.refuse(2, "normals: takes the slabs of the stage before it and cannot read 'a.vdb' as well",
                     "run", f"{SOURCE} ! normals a.vdb -o x.vdb")

@@ -48,6 +48,7 @@ TEST(NamedFile, TheValuesOfOptionsAreNoWords) {
   EXPECT_EQ(split("csg", {"--union", "b.vdb", "a.vdb"}), Split("a.vdb", {"--union", "b.vdb"}));
   EXPECT_EQ(split("csg", {"--union=b.vdb", "a.vdb"}), Split("a.vdb", {"--union=b.vdb"}));
   EXPECT_EQ(split("info", {"--json", "a.vdb"}), Split("a.vdb", {"--json"}));
+  EXPECT_EQ(split("normals", {"-qo", "b.vdb", "a.vdb"}), Split("a.vdb", {"-qo", "b.vdb"}));
 }
 
 TEST(NamedFile, TheInputStandsBeforeTheOperatorsOwnWords) {

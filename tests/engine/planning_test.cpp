@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/numbered_layers.h"
+#include "vdbdither/engine/version.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -96,9 +97,11 @@ TEST(Planning, OutputsAreThoseOfTheWantedLayers) {
 }
 
 TEST(Planning, TheHistoryHasALineForEverySourceAndFilter) {
-  const JobPlan plan = planOf("numbers --top 8 ! sum --below 2 ! keep");
+  const JobPlan plan = planOf("numbers --top 8 ! enlarge --by 2 ! keep");
+  const std::string made_by = std::string(" # vdbdither ") + version;
   EXPECT_EQ(plan.stages.back().schema.metadata.at("vdbdither:history"),
-            "numbers --top 8\nsum --below 2");
+            "numbers --bottom 0 --top 8" + made_by + "\nenlarge --by 2" + made_by);
+  EXPECT_EQ(plan.stages[0].arguments, "--bottom 0 --top 8");
 }
 
 TEST(Planning, RefusesWhatCannotBe) {

@@ -66,7 +66,8 @@ TEST(Hollow, RefusesDrainsThatAreNone) {
   const auto drained = [](const std::string& drain) {
     return planning(ballWithBand(0.4), {"--thickness", "0.2", "--drain", drain});
   };
-  for (const char* bad : {"", "1,2,3", "0,0,0:0,0,1", "0,0,0:0,0,1:", "0,0,0:0,0,1:x", "1e300,0,0:0,0,1:1", "0,0,0:1e200,1e200,1:1"}) {
+  for (const char* bad : {"", "1,2,3", "0,0,0:0,0,1", "0,0,0:0,0,1:", "0,0,0:0,0,1:x",
+                          "1e300,0,0:0,0,1:1", "0,0,0:1e200,1e200,1:1"}) {
     EXPECT_THAT(drained(bad), ThrowsMessage<UsageError>(
                                   HasSubstr("is not a position, a direction and a diameter")))
         << bad;

@@ -128,7 +128,8 @@ TEST_F(ResampleTest, RefusesWhatHasNoSurface) {
   EXPECT_THAT(planning({{"ball", levelSet()}}, {"--level", "7"}),
               ThrowsMessage<DataError>(HasSubstr("is inside everywhere beyond its voxels")));
   EXPECT_THAT(planning({{"ball", levelSet()}}, {"--level", "x"}),
-              ThrowsMessage<UsageError>(HasSubstr("--level: 'x' is not accepted; the value must be a number")));
+              ThrowsMessage<UsageError>(
+                  HasSubstr("--level: 'x' is not accepted; the value must be a number")));
   const auto classless = levelSet();
   classless->setGridClass(openvdb::GRID_UNKNOWN);
   EXPECT_THAT(planning({{"ball", classless}}),

@@ -54,8 +54,8 @@ struct LayerRange {
   int top = 16;
 
   void declare(Options& options) {
-    options.integer("bottom", bottom, -1000, 1000, "The lowest layer");
-    options.integer("top", top, -1000, 1000, "The layer above the highest");
+    options.integer("bottom", bottom, {-1000, 1000}, "The lowest layer");
+    options.integer("top", top, {-1000, 1000}, "The layer above the highest");
   }
   [[nodiscard]] ZRange layers() const { return {bottom, top}; }
 };
@@ -77,9 +77,9 @@ class Numbers : public Source {
 class Sum : public Filter {
  public:
   void declare(Options& options) override {
-    options.integer("below", below_, 0, 100, "Layers below");
-    options.integer("above", above_, 0, 100, "Layers above");
-    options.integer("fail-at", fail_at_, 0, 1000, "The layer to fail on");
+    options.integer("below", below_, {0, 100}, "Layers below");
+    options.integer("above", above_, {0, 100}, "Layers above");
+    options.integer("fail-at", fail_at_, {0, 1000}, "The layer to fail on");
   }
   Schema plan(const Schema& in) override { return in; }
   [[nodiscard]] std::vector<Read> reads() const override { return {{"n", {below_, above_}}}; }
@@ -105,7 +105,7 @@ class Sum : public Filter {
 class Enlarge : public Filter {
  public:
   void declare(Options& options) override {
-    options.integer("by", by_, 0, 100, "Layers at both ends");
+    options.integer("by", by_, {0, 100}, "Layers at both ends");
   }
   Schema plan(const Schema& in) override {
     Schema out = in;

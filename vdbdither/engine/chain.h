@@ -22,7 +22,7 @@ struct Step {
 /// Cuts words at every separator (`!` or `|`). Throws UsageError if a step is empty.
 std::vector<Step> parseChain(std::span<const std::string> words);
 
-/// Cuts a line into words as a shell would: blanks separate, quotes, `$'...'` with its escapes and
+/// Cuts a line into words as a shell does: blanks separate, quotes, `$'...'` with its escapes and
 /// backslashes keep together. An unquoted `|` or `!` is a word of its own, wherever it stands. A
 /// `#` that is a whole word begins a comment, up to the end of the line. Throws UsageError for a
 /// quote that is not closed.

@@ -13,14 +13,22 @@ namespace {
 
 bool isVdb(const std::string& file) { return file.ends_with(".vdb"); }
 
-/// Whether an option takes the word behind it as its value.
+/// Whether `word`, an option or several letters, takes the word behind it as its value.
 bool takesNextWord(const std::string& word, const Options& own, const Options& common) {
-  for (const Options* options : {&own, &common}) {
-    for (const Option& option : options->all()) {
-      const bool named = word == "--" + option.name;
-      const bool lettered = option.letter && word == std::string{'-', option.letter};
-      if (named || lettered) return option.kind == Option::Kind::value;
+  const auto takes_value = [&](const auto& matches) {
+    for (const Options* options : {&own, &common}) {
+      for (const Option& option : options->all()) {
+        if (matches(option)) return option.kind == Option::Kind::value;
+      }
     }
+    return false;
+  };
+  if (word.starts_with("--"))
+    return takes_value([&](const Option& option) { return word == "--" + option.name; });
+  // `-qi a.vdb`: the first letter with a value takes what follows it.
+  for (std::size_t at = 1; at < word.size(); ++at) {
+    if (takes_value([&](const Option& option) { return option.letter == word[at]; }))
+      return at + 1 == word.size();
   }
   return false;
 }

@@ -82,15 +82,15 @@ Texts valueOf(const std::string& text) { return text.empty() ? Texts{} : Texts{t
 std::string firstOf(const Texts& texts) { return texts.empty() ? "" : texts.front(); }
 
 template <typename T>
-void bind(Option& option, T& target, const Notation<T>& notation) {
+void attach(Option& option, T& target, const Notation<T>& notation) {
   option.set = [&target, notation](const std::string& text) { target = notation.parse(text); };
   option.get = [&target, notation] { return Texts{notation.text(target)}; };
   option.fallback = firstOf(option.get());
 }
 
 template <typename T>
-void bind(Option& option, std::optional<T>& target, const Notation<T>& notation,
-          const Word& empty) {
+void attach(Option& option, std::optional<T>& target, const Notation<T>& notation,
+            const Word& empty) {
   if (!empty.name.empty()) option.words = {empty};
   option.set = [&target, notation, empty](const std::string& text) {
     if (!empty.name.empty() && text == empty.name) {
@@ -293,76 +293,76 @@ void Options::texts(std::string name, Texts& targets, std::string value, std::st
 void Options::text(std::string name, std::optional<std::string>& target, std::string value,
                    std::string help, const Word& empty) {
   const auto same = [](const std::string& text) { return text; };
-  bind(add(std::move(name), Option::Kind::value, std::move(value), std::move(help)), target,
-       {same, same}, empty);
+  attach(add(std::move(name), Option::Kind::value, std::move(value), std::move(help)), target,
+         {same, same}, empty);
 }
 
 void Options::integer(std::string name, int& target, Range range, std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, "N", std::move(help));
   option.range = range.text();
-  bind(option, target, wholeNumbers(range));
+  attach(option, target, wholeNumbers(range));
 }
 
 void Options::integer(std::string name, std::optional<int>& target, Range range, std::string help,
                       const Word& empty) {
   Option& option = add(std::move(name), Option::Kind::value, "N", std::move(help));
   option.range = range.text();
-  bind(option, target, wholeNumbers(range), empty);
+  attach(option, target, wholeNumbers(range), empty);
 }
 
 void Options::number(std::string name, double& target, Range range, std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, "X", std::move(help));
   option.range = range.text();
-  bind(option, target, numbers(range));
+  attach(option, target, numbers(range));
 }
 
 void Options::number(std::string name, std::optional<double>& target, Range range, std::string help,
                      const Word& empty) {
   Option& option = add(std::move(name), Option::Kind::value, "X", std::move(help));
   option.range = range.text();
-  bind(option, target, numbers(range), empty);
+  attach(option, target, numbers(range), empty);
 }
 
 void Options::length(std::string name, double& target_mm, Range range_mm, std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, "LENGTH", std::move(help));
   option.range = range_mm.text("mm");
-  bind(option, target_mm, lengthsInMm(range_mm));
+  attach(option, target_mm, lengthsInMm(range_mm));
 }
 
 void Options::length(std::string name, std::optional<double>& target_mm, Range range_mm,
                      std::string help, const Word& empty) {
   Option& option = add(std::move(name), Option::Kind::value, "LENGTH", std::move(help));
   option.range = range_mm.text("mm");
-  bind(option, target_mm, lengthsInMm(range_mm), empty);
+  attach(option, target_mm, lengthsInMm(range_mm), empty);
 }
 
 void Options::triple(std::string name, Vec3d& target, std::string value, Range range,
                      std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
   option.range = range.text();
-  bind(option, target, triples<Vec3d>(numbers(range), "number", range.text()));
+  attach(option, target, triples<Vec3d>(numbers(range), "number", range.text()));
 }
 
 void Options::triple(std::string name, Coord& target, std::string value, Range range,
                      std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
   option.range = range.text();
-  bind(option, target, triples<Coord>(wholeNumbers(range), "whole number", range.text()));
+  attach(option, target, triples<Coord>(wholeNumbers(range), "whole number", range.text()));
 }
 
 void Options::lengths(std::string name, Vec3d& target_mm, std::string value, Range range_mm,
                       std::string help) {
   Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
   option.range = range_mm.text("mm");
-  bind(option, target_mm, triples<Vec3d>(lengthsInMm(range_mm), "length", range_mm.text("mm")));
+  attach(option, target_mm, triples<Vec3d>(lengthsInMm(range_mm), "length", range_mm.text("mm")));
 }
 
 void Options::lengths(std::string name, std::optional<Vec3d>& target_mm, std::string value,
                       Range range_mm, std::string help, const Word& empty) {
   Option& option = add(std::move(name), Option::Kind::value, std::move(value), std::move(help));
   option.range = range_mm.text("mm");
-  bind(option, target_mm, triples<Vec3d>(lengthsInMm(range_mm), "length", range_mm.text("mm")),
-       empty);
+  attach(option, target_mm, triples<Vec3d>(lengthsInMm(range_mm), "length", range_mm.text("mm")),
+         empty);
 }
 
 void Options::parsed(std::string name, std::string value,

@@ -90,11 +90,7 @@ void planSlabs(JobPlan& plan, const RunOptions& options) {
            memoryBytes(plan, plan.slab_layers) > plan.memory_limit_bytes)
       plan.slab_layers /= 2;
   } else {
-    std::istringstream stream(options.slab);
-    if (!(stream >> plan.slab_layers) || !stream.eof() || plan.slab_layers < leaf_layers ||
-        plan.slab_layers % leaf_layers != 0) {
-      throw UsageError("--slab: '" + options.slab + "' is not a multiple of 8, auto or all");
-    }
+    plan.slab_layers = std::stoi(options.slab);
   }
   plan.memory_bytes = memoryBytes(plan, plan.slab_layers);
   if (plan.memory_bytes > plan.memory_limit_bytes && !options.explain) {

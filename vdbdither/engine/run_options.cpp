@@ -8,8 +8,23 @@
 #include <utility>
 
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
+
+namespace {
+
+/// `text` itself. Throws UsageError unless it is auto, all, or a multiple of the layers of a leaf.
+std::string checkedSlab(const std::string& text) {
+  if (text == "auto" || text == "all") return text;
+  const std::string wanted = "a multiple of 8, auto or all";
+  const double layers = parseNumber(text, {leaf_layers, 1 << 20}, wanted);
+  if (std::fmod(layers, leaf_layers) != 0)
+    throw UsageError("'" + text + "' is not accepted; the value must be " + wanted);
+  return std::to_string(static_cast<int>(layers));
+}
+
+}  // namespace
 
 void RunOptions::declare(Options& options) {
   options.file("input", input, "FILE.vdb",
@@ -20,7 +35,9 @@ void RunOptions::declare(Options& options) {
   options.letter('o');
   options.flag("overwrite", overwrite, "Replaces the output if it exists");
   options.integer("threads", threads, {0, 4096}, "Number of threads; 0 takes all");
-  options.text("slab", slab, "N", "Number of layers worked on at a time, a multiple of 8");
+  options.parsed(
+      "slab", "N", [this](const std::string& text) { slab = checkedSlab(text); },
+      [this] { return slab; }, "Number of layers worked on at a time, a multiple of 8");
   options.words(
       {{"auto", "As many as the memory allows, up to 64"}, {"all", "All layers at once"}});
   options.parsed(

@@ -1,0 +1,149 @@
+#include "io/stack/slice_format.h"
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "io/stack/stack_reader.h"
+#include "io/stack/stack_writer.h"
+#include "tests/support/run_images.h"
+#include "tests/support/scratch_folder.h"
+#include "vdbdither/model/errors.h"
+
+namespace vdbdither {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::ThrowsMessage;
+
+/// What every registered format promises.
+class SliceFormats : public testing::TestWithParam<const SliceFormat*> {
+ protected:
+  static constexpr ZRange layers{-3, 14};
+
+  [[nodiscard]] static Manifest planned() {
+    Manifest stack;
+    stack.format = GetParam()->name;
+    stack.lattice = {{0.042, 0.084, 0.022},
+                     {0, 0, 0},
+                     CoordBBox(Coord(0, 0, layers.begin), Coord(18, 10, layers.end - 1))};
+    stack.frame = {stack.lattice.box, 0, false, false};
+    stack.background = {0, 0, 0, 255};
+    stack.materials = {
+        {"white", {240, 240, 240, 255}}, {"black", {26, 26, 29, 255}}, {"red", {255, 0, 0, 255}}};
+    return stack;
+  }
+
+  /// A layer with voxels of all three materials and empty ones.
+  /// @param most  the maximum of its values
+  [[nodiscard]] static RunImage image(int z, std::uint32_t most = 3) {
+    return test::runImage(19, 11, [&](int x, int y) {
+      const int value = x * x + y * y > 200 ? 0 : (x / 3 + y / 2 + z * z) % 4;
+      return std::min(static_cast<std::uint32_t>(value), most);
+    });
+  }
+
+  /// Writes a stack of all layers.
+  Manifest write(const std::filesystem::path& target) const {
+    const Manifest stack = planned();
+    const std::unique_ptr<SliceEncoder> encoder = GetParam()->encoder();
+    encoder->plan(stack, {});
+    StackWriter writer(target, stack, {"s", 3, 7}, *encoder);
+    for (int z = layers.begin; z < layers.end; z += 5) {
+      const ZRange piece = intersection({z, z + 5}, layers);
+      std::vector<RunImage> images;
+      for (int layer = piece.begin; layer < piece.end; ++layer) images.push_back(image(layer));
+      writer.add(piece, images, {});
+    }
+    return writer.finish();
+  }
+
+  test::ScratchFolder scratch_;
+};
+
+TEST_P(SliceFormats, ReadsBackWhatItWrites) {
+  for (const char* name : {"folder", "archive.zip"}) {
+    write(scratch_ / name);
+    std::vector<std::string> warnings;
+    const StackReader reader(scratch_ / name,
+                             [&](const std::string& text) { warnings.push_back(text); });
+    EXPECT_EQ(&reader.format(), GetParam());
+    EXPECT_EQ(reader.manifest().layers, layers);
+    for (int z = layers.begin; z < layers.end; ++z) {
+      const bool tells_materials = GetParam()->pixel != SlicePixel::printed;
+      const RunImage expected = image(z, tells_materials ? 3 : 1);
+      EXPECT_TRUE(reader.layer(z) == expected) << z;
+    }
+    EXPECT_THAT(warnings, IsEmpty());
+  }
+}
+
+TEST_P(SliceFormats, ItsManifestNamesEverySliceOnce) {
+  const Manifest stack = write(scratch_ / "out");
+  EXPECT_EQ(stack.slices.size(),
+            static_cast<std::size_t>(layers.size()) * GetParam()->filesOfLayer(3));
+  const auto there = test::filesUnder(scratch_ / "out");
+  std::set<std::string> names;
+  for (const Manifest::Slice& slice : stack.slices) {
+    EXPECT_TRUE(names.insert(slice.file).second) << slice.file;
+    EXPECT_TRUE(there.contains(slice.file)) << slice.file;
+  }
+  EXPECT_THAT(stack.slices.front().file, HasSubstr("s007."));
+}
+
+TEST_P(SliceFormats, ASpoiltFileIsDecodedOrRefused) {
+  const Manifest stack = write(scratch_ / "out");
+  const std::vector<std::uint8_t> bytes =
+      test::filesUnder(scratch_ / "out").at(stack.slices.front().file);
+  const auto expect_decoded_or_refused = [&](std::span<const std::uint8_t> spoilt) {
+    try {
+      GetParam()->decode(spoilt);
+    } catch (const DataError& error) {
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+    }
+  };
+  for (std::size_t size = 0; size < bytes.size(); size += 7)
+    expect_decoded_or_refused(std::span(bytes).first(size));
+  std::mt19937 random(5);
+  for (int round = 0; round < 100; ++round) {
+    std::vector<std::uint8_t> spoilt = bytes;
+    spoilt[random() % spoilt.size()] = static_cast<std::uint8_t>(random());
+    expect_decoded_or_refused(spoilt);
+  }
+}
+
+TEST_P(SliceFormats, IsFoundByItsName) { EXPECT_EQ(findSliceFormat(GetParam()->name), GetParam()); }
+
+INSTANTIATE_TEST_SUITE_P(Registered, SliceFormats, testing::ValuesIn(sliceFormats()),
+                         [](const auto& format) { return std::string(format.param->name); });
+
+TEST(SliceFormatTable, IsListedInMessages) {
+  EXPECT_THAT(sliceFormatNames(), testing::ContainsRegex("exr, .*png1, .* or "));
+  const std::string in_colours =
+      sliceFormatNames([](const SliceFormat& format) { return format.showsColours(); });
+  EXPECT_THAT(in_colours, testing::ContainsRegex("png.*tiff"));
+  EXPECT_THAT(in_colours, testing::Not(HasSubstr("png8")));
+  EXPECT_EQ(findSliceFormat("jpeg"), nullptr);
+}
+
+TEST(StackReader, RefusesAFormatThatIsNotInTheTable) {
+  const test::ScratchFolder scratch;
+  Manifest stack;
+  stack.format = "jpeg";
+  stack.lattice.box = CoordBBox(Coord(0), Coord(1));
+  stack.frame.box = stack.lattice.box;
+  stack.layers = stack.lattice.layers();
+  scratch.write("manifest.json", textOf(stack));
+  EXPECT_THAT(
+      [&] { StackReader(scratch.path(), {}); },
+      ThrowsMessage<DataError>(HasSubstr("there is no format 'jpeg'; make the stack again")));
+}
+
+}  // namespace
+}  // namespace vdbdither
