@@ -361,4 +361,16 @@ std::vector<RunImage> sliceRuns(const openvdb::BoolGrid& grid, const SliceFrame&
   return slice(grid, frame, layers);
 }
 
+RunImage blankSlice(const SliceFrame& frame) {
+  RunImage image{frame.width(), frame.height(), {}, {}};
+  for (std::uint32_t y = 0; y <= image.height; ++y) image.row_begin.push_back(y);
+  image.runs.assign(image.height, {image.width, 0});
+  return image;
+}
+
+bool isBlank(const RunImage& slice) {
+  return std::all_of(slice.runs.begin(), slice.runs.end(),
+                     [](const Run& run) { return run.value == 0; });
+}
+
 }  // namespace vdbdither

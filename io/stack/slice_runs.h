@@ -30,6 +30,12 @@ std::vector<RunImage> sliceRuns(const openvdb::Int32Grid& grid, const SliceFrame
 std::vector<RunImage> sliceRuns(const openvdb::BoolGrid& grid, const SliceFrame& frame,
                                 ZRange layers);
 
+/// A slice without a voxel.
+RunImage blankSlice(const SliceFrame& frame);
+
+/// Whether no voxel of it is printed.
+bool isBlank(const RunImage& slice);
+
 /// The way back: a grid whose layers are the pictures `images`, the first one of them the layer
 /// `layers.begin`; 0 is inactive. What lies outside the frame's box is left out. In canonical form.
 openvdb::Int32Grid::Ptr gridOfRuns(std::span<const RunImage> images, const SliceFrame& frame,

@@ -19,13 +19,6 @@ std::string colourText(std::uint32_t colour) {
   return text;
 }
 
-RunImage blank(std::uint32_t width, std::uint32_t height) {
-  RunImage image{width, height, {}, {}};
-  for (std::uint32_t y = 0; y <= height; ++y) image.row_begin.push_back(y);
-  image.runs.assign(height, {width, 0});
-  return image;
-}
-
 /// Puts `value` where `mask` is not 0. Returns where something else is already: the row, or -1.
 int overlay(RunImage& image, const RunImage& mask, std::uint32_t value) {
   RunsBuilder merged(image.width);
@@ -131,8 +124,9 @@ std::map<std::uint32_t, std::uint32_t> StackReader::meaningsOfPixels() const {
 }
 
 RunImage StackReader::layer(int z) const {
+  if (!manifest_.layers.contains(z)) return blankSlice(manifest_.frame);
   if (format_->pixel != SlicePixel::one_material) return read(*find(z, ""));
-  RunImage all = blank(manifest_.frame.width(), manifest_.frame.height());
+  RunImage all = blankSlice(manifest_.frame);
   for (std::uint32_t i = 1; i <= manifest_.materials.size(); ++i) {
     const Manifest::Slice& slice = *find(z, manifest_.materials[i - 1].name);
     const int row = overlay(all, read(slice), i);
