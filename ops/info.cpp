@@ -193,11 +193,11 @@ class Description {
       entry["min"] = triple(summary.box.min());
       entry["max"] = triple(summary.box.max());
       if (hasRange(grid) && isVector(grid)) {
-        entry["least"] = triple(summary.least);
-        entry["greatest"] = triple(summary.greatest);
+        entry["least"] = triple(summary.minimum);
+        entry["greatest"] = triple(summary.maximum);
       } else if (hasRange(grid)) {
-        entry["least"] = summary.least[0];
-        entry["greatest"] = summary.greatest[0];
+        entry["least"] = summary.minimum[0];
+        entry["greatest"] = summary.maximum[0];
       }
     }
     if (name == material_grid) {
@@ -220,11 +220,11 @@ class Description {
     if (summary.active_voxels > 0) {
       text << " from " << tripleText(summary.box.min()) << " to " << tripleText(summary.box.max());
       if (hasRange(grid) && isVector(grid)) {
-        text << ", values (" << tripleText(summary.least) << ") to ("
-             << tripleText(summary.greatest) << ")";
+        text << ", values (" << tripleText(summary.minimum) << ") to ("
+             << tripleText(summary.maximum) << ")";
       } else if (hasRange(grid)) {
-        text << ", values " << shortText(summary.least[0]) << " to "
-             << shortText(summary.greatest[0]);
+        text << ", values " << shortText(summary.minimum[0]) << " to "
+             << shortText(summary.maximum[0]);
       }
     }
     text << ", " << bytesText(static_cast<double>(summary.leaf_bytes));

@@ -118,7 +118,7 @@ class MaskSpectrum : public Sink {
 
   static ordered_json json(const FacetSummary& facets) {
     return {{"mean", facets.mean},
-            {"greatest", facets.greatest},
+            {"greatest", facets.maximum},
             {"low_mean", facets.low_mean},
             {"low_worst", facets.low_worst},
             {"worst_normal",

@@ -19,7 +19,7 @@
 #include "ops/kernels/mesh/closest_point.h"
 #include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/mesh_placement.h"
-#include "ops/kernels/mesh/mesh_repair.h"
+#include "ops/kernels/mesh/solid_mesh.h"
 #include "ops/kernels/mesh/taubin.h"
 #include "ops/kernels/picture/diverging_colours.h"
 #include "vdbdither/engine/operator.h"
@@ -43,7 +43,7 @@ ordered_json json(const ErrorStatistics& statistics) {
                       {"mean_mm", statistics.mean_mm},       {"rms_mm", statistics.rms_mm},
                       {"p50_mm", statistics.percentile(50)}, {"p90_mm", statistics.percentile(90)},
                       {"p95_mm", statistics.percentile(95)}, {"p99_mm", statistics.percentile(99)},
-                      {"max_mm", statistics.most_mm}};
+                      {"max_mm", statistics.maximum_mm}};
   for (int percent = 0; percent <= 100; ++percent)
     result["cumulative_mm"].push_back(statistics.percentile(percent));
   return result;
@@ -232,14 +232,15 @@ class SurfaceMeasurement {
     MeshPlacement placement{given.rotate_degrees, given.mmPerUnit(), given.fit_mm.value_or(0)};
     if (given.on_bed) placement.corner_mm = bedCornerMm(*lattice);
     place(mesh, placement);
-    MeshRepairs repairs;
-    mesh = repaired(std::move(mesh), repairs);
-    if (mesh.triangles.empty())
+    // Errors are measured to the triangles given, so that nothing is guessed in their place.
+    SolidMesh solid = solidMesh(std::move(mesh), {.guess = false, .find_walls = false});
+    if (solid.mesh.triangles.empty())
       throw DataError(
           "--reference: the mesh has no surface: all its triangles are degenerate or "
           "cancel");
-    for (const std::string& line : repairs.lines()) reporter.warn("--reference: " + line);
-    reference_.emplace(std::move(mesh));
+    for (const std::string& line : solid.report.repairs.lines())
+      reporter.warn("--reference: " + line);
+    reference_.emplace(std::move(solid.mesh));
   }
 
   [[nodiscard]] ordered_json figures(const SurfaceErrors& errors, const Mesh& mesh,
@@ -332,22 +333,17 @@ class Measure : public Sink {
   void write(const Slab& in) override {
     const GridConstPtr& grid = in.grids.at(name_);
     for (const BitLayer& layer : surface_->insideOf(grid, in.core)) components_->add(layer);
-    take(surface_->add(grid, in.core));
+    append(mesh_, surface_->add(grid, in.core));
   }
 
   void finish() override {
-    take(surface_->finish());
+    append(mesh_, surface_->finish());
     if (mesh_.triangles.empty())
       throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
     measurement_.finish(std::move(mesh_), "grid " + name_, &lattice_, &*components_, report());
   }
 
  private:
-  void take(const SurfacePiece& piece) {
-    mesh_.vertices.insert(mesh_.vertices.end(), piece.vertices.begin(), piece.vertices.end());
-    mesh_.triangles.insert(mesh_.triangles.end(), piece.triangles.begin(), piece.triangles.end());
-  }
-
   SurfaceMeasurement measurement_;
   std::string name_;
   Lattice lattice_;
@@ -375,11 +371,10 @@ class MeasureMesh : public Tool {
   }
 
  private:
-  /// Smoothing moves the border of an open mesh: measuring it would be meaningless.
+  /// Refuses to smooth a mesh that is not closed: borders would be measured as smoothing left them.
   void checkClosed(const Mesh& mesh) const {
-    MeshRepairs repairs;
-    repaired(mesh, repairs);
-    const std::vector<std::string> lines = repairs.lines();
+    const std::vector<std::string> lines =
+        solidMesh(mesh, {.guess = false, .find_walls = false}).report.repairs.lines();
     if (!lines.empty()) {
       throw DataError("--smooth: '" + file_ + "' is no closed mesh (" + lines.front() +
                       "); measure it as it is, or repair it first");

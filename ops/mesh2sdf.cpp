@@ -1,5 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <span>
+#include <utility>
 
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
@@ -10,8 +13,7 @@
 #include "ops/kernels/leaf/part_index.h"
 #include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/mesh_placement.h"
-#include "ops/kernels/mesh/mesh_repair.h"
-#include "ops/kernels/mesh/winding_surface.h"
+#include "ops/kernels/mesh/solid_mesh.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
@@ -50,17 +52,17 @@ class MeshToSdf : public Source {
     Schema schema;
     const Vec3d pitch_mm = targetPitchMm(target_, schema);
     held_band_mm_ = band_.leastMm(pitch_mm);
-    Mesh mesh = readMeshes();
-    const double tie_mm = place(mesh, pitch_mm);
-    questionSize(mesh, schema);
-    const std::vector<Mesh> parts = closed(mesh);  // which a guess may make larger
-    schema.lattice = latticeOfMesh(mesh, pitch_mm);
+    std::vector<Mesh> meshes = readMeshes();
+    const double tie_mm = placed(meshes, pitch_mm);
+    questionSize(meshes, schema);
+    const SolidBodies solids = solidsOf(std::move(meshes));
+    schema.lattice = latticeOfMesh(solids.whole.mesh, pitch_mm);  // a guess may be larger
     const Lattice& lattice = schema.lattice;
-    for (const Mesh& part : parts)
-      parts_.emplace_back(part, lattice, band_, DistanceExtras{}, swallowedWalls(part), tie_mm);
-    const SwallowedWalls hidden = wallsOf(mesh);
-    countLeaves(mesh, schema);
-    field_ = std::make_unique<MeshDistance>(mesh, lattice, band_, extras_, hidden, tie_mm);
+    for (const SolidMesh& part : solids.bodies)
+      parts_.emplace_back(part.mesh, lattice, band_, DistanceExtras{}, part.walls, tie_mm);
+    countLeaves(solids.whole.mesh, schema);
+    field_ = std::make_unique<MeshDistance>(solids.whole.mesh, lattice, band_, extras_,
+                                            solids.whole.walls, tie_mm);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
@@ -91,23 +93,19 @@ class MeshToSdf : public Source {
   }
 
  private:
-  /// Brings the mesh to where it is printed. Returns what its file leaves open of a position, mm:
-  /// most files hold coordinates in single precision.
-  double place(Mesh& mesh, const Vec3d& pitch_mm) const {
+  /// Moves the meshes to where they are printed. Returns the length that their files leave open of
+  /// a position, mm: most files hold coordinates in single precision.
+  double placed(std::vector<Mesh>& meshes, const Vec3d& pitch_mm) const {
     constexpr double open = 0x1p-20;
-    const MeshBounds bounds = boundsOf(mesh);
+    const MeshBounds bounds = boundsOf(meshes);
     double greatest = 0;
     for (int axis = 0; axis < 3; ++axis)
       greatest = std::max({greatest, std::abs(bounds.min[axis]), std::abs(bounds.max[axis])});
     MeshPlacement placement{placement_.rotate_degrees, placement_.mmPerUnit(),
                             placement_.fit_mm.value_or(0)};
     if (placement_.on_bed) placement.corner_mm = bedCornerMm({.pitch_mm = pitch_mm});
-    return open * greatest * vdbdither::place(mesh, placement);
+    return open * greatest * place(meshes, placement);
   }
-
-  struct MeshSize {
-    std::size_t vertices, triangles;
-  };
 
   static Band bandFrom(const std::string& text) {
     constexpr Range diameters = Range::above(0, 1000);
@@ -121,150 +119,69 @@ class MeshToSdf : public Source {
     return band_.mm > 0 ? shortestText(band_.mm) + "mm" : shortestText(band_.diameters);
   }
 
-  /// What of the closed mesh is no surface, with what was repaired told or refused.
-  SwallowedWalls wallsOf(const Mesh& mesh) const {
-    MeshRepairs repairs = repairs_;
-    if (mesh.triangles.empty())
+  /// The solids that the meshes bound, with a warning for every repair and every guess.
+  SolidBodies solidsOf(std::vector<Mesh> meshes) {
+    SolidOptions options;
+    options.before_guess = [this](const LooseTriangles& loose) {
+      if (strict_)
+        throw DataError(
+            "the mesh needs repair, which --strict forbids: the triangles enclose nothing, " +
+            loose.text());
+      if (extras_.closest)
+        throw DataError("the triangles enclose nothing, " + loose.text() +
+                        ": the part is guessed, and no point of its surface has a triangle for "
+                        "--closest to name; leave it out");
+    };
+    options.progress = [this](double fraction) { report().progress(fraction); };
+    SolidBodies solids = solidBodies(std::move(meshes), options);
+    for (const SurfaceGuess& guess : solids.whole.report.guesses) {
+      report().warn("the triangles enclose nothing, " + guess.loose.text() +
+                    ": the part is guessed, as where their winding number is above one half" +
+                    (guess.turned ? ", seen from behind since they face inwards" : "") +
+                    ", on cells down to " + shortestText(std::round(guess.cell_mm * 1e4) / 10) +
+                    " um");
+      report().count("winding_cell_mm", guess.cell_mm);
+    }
+    if (solids.whole.mesh.triangles.empty())
       throw DataError("the mesh has no surface: all its triangles are degenerate or cancel");
-    SwallowedWalls walls;
-    if (!is_guess_) walls = swallowedWalls(mesh);
-    repairs.swallowed_triangles = walls.swallowed;
-    repairs.cut_triangles = walls.cut;
+    reportRepairs(solids.whole.report);
+    return solids;
+  }
+
+  void reportRepairs(const SolidReport& solid) {
+    const MeshRepairs& repairs = solid.repairs;
     const std::vector<std::string> lines = repairs.lines();
     if (strict_ && !lines.empty())
       throw DataError("the mesh needs repair, which --strict forbids: " + lines.front() +
                       (lines.size() > 1 ? " and more" : ""));
     for (const std::string& line : lines) report().warn(line);
+    LooseTriangles loose;
+    for (const SurfaceGuess& guess : solid.guesses) {
+      loose.triangles += guess.loose.triangles;
+      loose.open_sides += guess.loose.open_sides;
+    }
     report().count("welded_vertices", static_cast<double>(repairs.welded_vertices));
     report().count("degenerate_triangles", static_cast<double>(repairs.degenerate_triangles));
     report().count("duplicate_triangles", static_cast<double>(repairs.duplicate_triangles));
     report().count("flipped_triangles", static_cast<double>(repairs.flipped_triangles));
     report().count("turned_parts", static_cast<double>(repairs.turned_parts));
-    report().count("boundary_edges", static_cast<double>(repairs.boundary_edges + loose_edges_));
+    report().count("boundary_edges",
+                   static_cast<double>(repairs.boundary_edges + loose.open_sides));
     report().count("closed_holes", static_cast<double>(repairs.closed_holes));
-    report().count("loose_triangles", static_cast<double>(loose_triangles_));
+    report().count("loose_triangles", static_cast<double>(loose.triangles));
     report().count("swallowed_triangles", static_cast<double>(repairs.swallowed_triangles));
     report().count("cut_triangles", static_cast<double>(repairs.cut_triangles));
-    return walls;
   }
 
-  /// A mesh that bounds a solid, and how it came to.
-  struct Closed {
-    Mesh mesh;
-    MeshRepairs repairs;
-    bool is_guess;
-  };
-
-  /// A file's mesh made to bound a solid: by repair, or where its triangles enclose nothing by the
-  /// surface of what they hint at.
-  Closed closedAlone(Mesh mesh) {
-    // Should the triangles prove loose, they are wanted as they came. Repair leaves the vertices
-    // and adds others behind them.
-    std::vector<Mesh::Triangle> given = mesh.triangles;
-    const std::size_t given_vertices = mesh.vertices.size();
-    Closed closed{{}, {}, false};
-    closed.mesh = repaired(std::move(mesh), closed.repairs);
-    const std::size_t triangles = closed.mesh.triangles.size();
-    closed.is_guess = closed.repairs.areOfLooseTriangles(triangles);
-    if (closed.is_guess) {
-      closed.mesh.triangles = std::move(given);
-      closed.mesh.vertices.resize(given_vertices);
-      closed.mesh = guessed(std::move(closed.mesh), triangles, closed.repairs);
-    }
-    return closed;
-  }
-
-  /// Makes `mesh` bound a solid. Of several files also each by itself; what is repaired in them is
-  /// told of the whole.
-  std::vector<Mesh> closed(Mesh& mesh) {
-    if (paths_.size() == 1) {
-      Closed closed = closedAlone(std::move(mesh));
-      mesh = std::move(closed.mesh);
-      is_guess_ = closed.is_guess;
-      if (!is_guess_) repairs_ = closed.repairs;
-      return {};
-    }
-    std::vector<Mesh> parts;
+  std::vector<Mesh> readMeshes() {
     std::vector<Mesh> meshes;
-    std::vector<Mesh> guesses;
-    for (Mesh& part : separated(mesh)) {
-      Closed closed = closedAlone(part);
-      parts.push_back(std::move(closed.mesh));
-      if (closed.is_guess) {
-        guesses.push_back(parts.back());
-      } else {
-        meshes.push_back(std::move(part));
-      }
-    }
-    mesh = repaired(joined(std::move(meshes)), repairs_);
-    is_guess_ = mesh.triangles.empty() && !guesses.empty();
-    guesses.insert(guesses.begin(), std::move(mesh));
-    mesh = joined(std::move(guesses));
-    return parts;
-  }
-
-  /// The surface of what loose triangles hint at. Repairing them took `closed_triangles` and
-  /// `repairs`.
-  Mesh guessed(Mesh loose, std::size_t closed_triangles, const MeshRepairs& repairs) {
-    const std::string open = std::to_string(repairs.boundary_edges) + " of their " +
-                             std::to_string(3 * (closed_triangles - repairs.filling_triangles)) +
-                             " sides meet no other";
-    if (strict_)
-      throw DataError(
-          "the mesh needs repair, which --strict forbids: the triangles enclose nothing, " + open);
-    if (extras_.closest)
-      throw DataError("the triangles enclose nothing, " + open +
-                      ": the part is guessed, and no point of its surface has a triangle for "
-                      "--closest to name; leave it out");
-    loose_edges_ += repairs.boundary_edges;
-    loose = withoutDuplicates(std::move(loose), repairs_);
-    loose_triangles_ += loose.triangles.size();
-    const WindingSurface surface =
-        windingSurface(loose, [this](double fraction) { report().progress(fraction); });
-    if (surface.mesh.triangles.empty())
-      throw DataError("the triangles enclose nothing: " + open +
-                      ", and their winding number is above one half nowhere; join them in a mesh "
-                      "editor first");
-    report().warn("the triangles enclose nothing, " + open +
-                  ": the part is guessed, as where their winding number is above one half" +
-                  (surface.turned ? ", seen from behind since they face inwards" : "") +
-                  ", on cells down to " + shortestText(std::round(surface.cell_mm * 1e4) / 10) +
-                  " um");
-    report().count("winding_cell_mm", surface.cell_mm);
-    return surface.mesh;
-  }
-
-  Mesh readMeshes() {
-    std::vector<Mesh> meshes;
-    for (const std::string& path : paths_) {
+    for (const std::string& path : paths_)
       meshes.push_back(readMesh(path, [this](const std::string& text) { report().warn(text); }));
-      sizes_.push_back({meshes.back().vertices.size(), meshes.back().triangles.size()});
-    }
-    return joined(std::move(meshes));
-  }
-
-  /// What was joined, file by file.
-  [[nodiscard]] std::vector<Mesh> separated(const Mesh& all) const {
-    std::vector<Mesh> meshes;
-    auto vertex = all.vertices.begin();
-    auto triangle = all.triangles.begin();
-    std::uint32_t first = 0;
-    for (const MeshSize& size : sizes_) {
-      const auto vertices = static_cast<std::ptrdiff_t>(size.vertices);
-      const auto triangles = static_cast<std::ptrdiff_t>(size.triangles);
-      Mesh& mesh =
-          meshes.emplace_back(Mesh{{vertex, vertex + vertices}, {triangle, triangle + triangles}});
-      for (Mesh::Triangle& t : mesh.triangles)
-        for (std::uint32_t& v : t) v -= first;
-      vertex += vertices;
-      triangle += triangles;
-      first += static_cast<std::uint32_t>(size.vertices);
-    }
     return meshes;
   }
 
   /// Warns of a part that is hardly meant to be as large or as small as it is.
-  void questionSize(const Mesh& mesh, const Schema& schema) const {
+  void questionSize(std::span<const Mesh> meshes, const Schema& schema) const {
     // 3 m and 0.1 mm, as far as floats of a file tell.
     constexpr double largest_mm = 3000 * (1 - 1e-6);
     constexpr double least_mm = 0.1 * (1 + 1e-6);
@@ -272,7 +189,7 @@ class MeshToSdf : public Source {
     const Vec3d build_mm = profile == schema.metadata.end()
                                ? Vec3d(0.0)
                                : printerProfileFromJson(profile->second).build_mm;
-    const MeshBounds bounds = boundsOf(mesh);
+    const MeshBounds bounds = boundsOf(meshes);
     const Vec3d size_mm = bounds.max - bounds.min;
     const double longest_mm = std::max({size_mm.x(), size_mm.y(), size_mm.z()});
     const auto rounded = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4); };
@@ -376,12 +293,7 @@ class MeshToSdf : public Source {
   Band band_;
   double held_band_mm_ = 0;
   std::unique_ptr<MeshDistance> field_;
-  double triangles_per_leaf_ = 0;  ///< of those that the surface itself meets
-  std::vector<MeshSize> sizes_;    ///< of every file
-  MeshRepairs repairs_;
-  bool is_guess_ = false;  ///< all of it, made from the winding number
-  std::uint64_t loose_triangles_ = 0;
-  std::uint64_t loose_edges_ = 0;
+  double triangles_per_leaf_ = 0;    ///< of those that the surface itself meets
   std::vector<MeshDistance> parts_;  ///< of every file, where there are several
 };
 

@@ -86,8 +86,7 @@ class MeshExport : public Sink {
       writer_->add(piece.vertices, piece.triangles, piece.open_from);
       return;
     }
-    mesh_.vertices.insert(mesh_.vertices.end(), piece.vertices.begin(), piece.vertices.end());
-    mesh_.triangles.insert(mesh_.triangles.end(), piece.triangles.begin(), piece.triangles.end());
+    append(mesh_, piece);
   }
 
   std::string file_;

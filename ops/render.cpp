@@ -206,25 +206,20 @@ class Render : public Sink {
 
   void write(const Slab& in) override {
     const GridConstPtr& grid = in.grids.at(name_);
-    if (!faces_) return take(surface_->add(grid, in.core));
+    if (!faces_) return append(mesh_, surface_->add(grid, in.core));
     int z = in.core.begin;
     for (BitLayer& layer : surface_->insideOf(grid, in.core))
-      take(faces_->add(std::move(layer), z++));
+      append(mesh_, faces_->add(std::move(layer), z++));
   }
 
   void finish() override {
-    take(faces_ ? faces_->finish() : surface_->finish());
+    append(mesh_, faces_ ? faces_->finish() : surface_->finish());
     if (mesh_.triangles.empty())
       throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
     picture_.finish(std::move(mesh_), report());
   }
 
  private:
-  void take(const SurfacePiece& piece) {
-    mesh_.vertices.insert(mesh_.vertices.end(), piece.vertices.begin(), piece.vertices.end());
-    mesh_.triangles.insert(mesh_.triangles.end(), piece.triangles.begin(), piece.triangles.end());
-  }
-
   SurfacePicture picture_;
   std::string name_;
   Lattice lattice_;

@@ -15,7 +15,7 @@
 
 #include "io/mesh/mesh_reader.h"
 #include "ops/kernels/distance/mesh_distance.h"
-#include "ops/kernels/mesh/mesh_repair.h"
+#include "ops/kernels/mesh/solid_mesh.h"
 
 namespace {
 
@@ -33,8 +33,8 @@ struct Part {
 };
 
 Part partOf(const std::string& path, double size_mm) {
-  MeshRepairs repairs;
-  const auto mesh = std::make_shared<Mesh>(repaired(readMesh(path, {}), repairs));
+  const SolidOptions repair_alone{.guess = false, .find_walls = false};
+  const auto mesh = std::make_shared<Mesh>(solidMesh(readMesh(path, {}), repair_alone).mesh);
   openvdb::math::BBox<Vec3d> bounds;
   for (const Vec3d& v : mesh->vertices) bounds.expand(v);
   const double scale = size_mm / bounds.extents()[bounds.maxExtent()];

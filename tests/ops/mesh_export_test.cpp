@@ -49,7 +49,7 @@ Mesh readWhole(const std::filesystem::path& path) {
   Mesh mesh = readMesh(path, [](const std::string& warning) { ADD_FAILURE() << warning; });
   EXPECT_EQ(test::firstFlaw(mesh), "");
   MeshRepairs repairs;
-  const Mesh same = repaired(mesh, repairs);
+  const Mesh same = repaired(derived(mesh), repairs).mesh;
   EXPECT_THAT(repairs.lines(), testing::IsEmpty());
   EXPECT_EQ(same.triangles.size(), mesh.triangles.size());
   return mesh;

@@ -15,6 +15,7 @@
 #include "tests/support/drawn_grids.h"
 #include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/slabs.h"
 #include "tests/support/told.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/registry.h"

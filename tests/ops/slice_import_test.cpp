@@ -14,6 +14,7 @@
 #include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/sinks.h"
+#include "tests/support/slabs.h"
 #include "tests/support/told.h"
 #include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"

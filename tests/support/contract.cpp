@@ -2,6 +2,7 @@
 
 #include "io/vdb/vdb.h"
 #include "tests/support/filters.h"
+#include "tests/support/slabs.h"
 #include "vdbdither/engine/window.h"
 #include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
@@ -20,40 +21,6 @@ std::string digest(const GridConstPtr& grid, ZRange range) {
   return archiveBytes({{{"grid", pruned(joinLayers(pieces, range))}}, {}}, VdbCodec::mask);
 }
 
-/// `grid` within `range`; outside, every voxel of `box` is active and holds rubbish.
-GridConstPtr spoiled(const GridConstPtr& grid, ZRange range, const CoordBBox& box) {
-  const std::vector<Layers> pieces{{grid, {range.begin - 4096, range.end + 4096}}};
-  const openvdb::GridBase::Ptr copy = joinLayers(pieces, range)->deepCopyGrid();
-  const auto fill = [&](auto& typed, const auto& rubbish) {
-    for (const ZRange outside :
-         {ZRange{box.min().z(), range.begin}, ZRange{range.end, box.max().z() + 1}}) {
-      if (outside.empty()) continue;
-      CoordBBox part = box;
-      part.min().z() = outside.begin;
-      part.max().z() = outside.end - 1;
-      typed.denseFill(part, rubbish, true);
-    }
-  };
-  if (const auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(copy)) fill(*floats, -0.011F);
-  if (const auto normals = openvdb::gridPtrCast<openvdb::Vec3SGrid>(copy)) {
-    fill(*normals, openvdb::Vec3s(0.6F, 0.0F, -0.8F));
-  }
-  if (const auto bits = openvdb::gridPtrCast<openvdb::BoolGrid>(copy)) fill(*bits, true);
-  if (const auto integers = openvdb::gridPtrCast<openvdb::Int32Grid>(copy)) fill(*integers, 7);
-  return copy;
-}
-
-Slab slabOf(Filter& filter, const Schema& in, const Grids& whole, ZRange core) {
-  const ZRange layers = in.lattice.layers();
-  Slab slab{core, reached(core, widest(filter.reads()), layers), {}};
-  for (const Read& read : filter.reads()) {
-    slab.grids[read.grid] =
-        spoiled(whole.at(read.grid), reached(core, read.reach, layers), in.lattice.box);
-  }
-  addInputs(filter, slab);
-  return slab;
-}
-
 std::string layersText(ZRange range) {
   return "layers " + std::to_string(range.begin) + " to " + std::to_string(range.end - 1);
 }
@@ -62,10 +29,9 @@ std::string layersText(ZRange range) {
 
 std::string firstBreach(Filter& filter, const Schema& in, const Grids& whole, int height) {
   const ZRange layers = in.lattice.layers();
-  const Grids expected = filter.run(slabOf(filter, in, whole, layers));
-  for (int begin = alignedToLeaves(layers).begin; begin < layers.end; begin += height) {
-    const ZRange core = intersection({begin, begin + height}, layers);
-    const Slab slab = slabOf(filter, in, whole, core);
+  const Grids expected = filter.run(slabFor(filter, in.lattice, whole, layers));
+  for (const ZRange core : slabsOf(layers, height)) {
+    const Slab slab = slabFor(filter, in.lattice, whole, core);
     std::map<std::string, std::string> before;
     for (const auto& [name, grid] : slab.grids) before[name] = digest(grid, layers);
     const Grids made = filter.run(slab);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <random>
 #include <tuple>
 
 namespace vdbdither::test {
@@ -70,6 +72,45 @@ double halfDiameter(const Vec3d& n, const Vec3d& pitch_mm) {
   const double norm = std::max({std::abs(n.x()) / pitch_mm.x(), std::abs(n.y()) / pitch_mm.y(),
                                 std::abs(n.z()) / pitch_mm.z()});
   return norm > 0 ? 1 / (2 * norm) : 0;
+}
+
+ThresholdMask permutationMask(int size) {
+  std::vector<float> values(static_cast<std::size_t>(size * size * size));
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    values[n] = (static_cast<float>(n) + 0.5F) / static_cast<float>(values.size());
+  }
+  std::shuffle(values.begin(), values.end(), std::mt19937(11));
+  return {Coord(size), values};
+}
+
+double bandFor(const ShapeDither& dither) {
+  return dither.largestDisplacementMm() + dither.pitch_mm.length();
+}
+
+ShapeDither defaultDither(const Vec3d& pitch_mm, bool guarded) {
+  return {pitch_mm,
+          2,
+          DitherAt::voxel,
+          permutationMask(16),
+          std::make_shared<AdaptedAmplitude>(pitch_mm, 0.05),
+          guarded};
+}
+
+Printed printed(const ShapeDither& dither, const TestShape& shape) {
+  const Lattice lattice = latticeAround(dither.pitch_mm, shape.extent_mm, 0.3);
+  const auto surface = sampled(shape.distance, lattice, bandFor(dither));
+  const auto result = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), false);
+  return {plainVoxels(dense(*surface, lattice.box)), dense(*result.solid, lattice.box)};
+}
+
+const TestShape& ballShape() {
+  static const TestShape shape{"ball", sphere({0.013, -0.02, 0.007}, 1.2), Vec3d(1.2)};
+  return shape;
+}
+
+const TestShape& ringShape() {
+  static const TestShape shape{"ring", torus({0.01, 0.01, 0}, 0.8, 0.4), {1.2, 1.2, 0.4}};
+  return shape;
 }
 
 }  // namespace vdbdither::test

@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 
+#include "ops/kernels/dither/shape_dither.h"
 #include "tests/support/volumes.h"
 
 namespace vdbdither::test {
@@ -30,5 +31,25 @@ openvdb::Vec3d gradientNormal(const openvdb::FloatGrid& surface, const openvdb::
 
 /// (6).
 double halfDiameter(const openvdb::Vec3d& n, const openvdb::Vec3d& pitch_mm);
+
+/// A mask of `size`³ thresholds (rank + ½) / n in random order, each of them once.
+ThresholdMask permutationMask(int size);
+
+/// The band that a dither needs of `sampled`, mm.
+double bandFor(const ShapeDither& dither);
+
+/// The default dither: adapted to a spread of 0.05 mm and guarded.
+ShapeDither defaultDither(const openvdb::Vec3d& pitch_mm, bool guarded = true);
+
+/// The voxels printed of a shape, without dithering and with it.
+struct Printed {
+  Voxels plain;
+  Voxels dithered;
+};
+Printed printed(const ShapeDither& dither, const TestShape& shape);
+
+/// Shapes that are thick everywhere.
+const TestShape& ballShape();
+const TestShape& ringShape();
 
 }  // namespace vdbdither::test

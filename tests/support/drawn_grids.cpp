@@ -1,7 +1,5 @@
 #include "tests/support/drawn_grids.h"
 
-#include "vdbdither/model/layers.h"
-
 namespace vdbdither::test {
 
 openvdb::Int32Grid::Ptr drawnMaterial(const std::vector<std::vector<std::string>>& layers,
@@ -25,21 +23,6 @@ openvdb::Int32Grid::Ptr drawnMaterial(const std::vector<std::vector<std::string>
 openvdb::BoolGrid::Ptr solidOf(const openvdb::Int32Grid& values) {
   return openvdb::BoolGrid::create(
       std::make_shared<openvdb::BoolTree>(values.tree(), false, true, openvdb::TopologyCopy()));
-}
-
-std::vector<Slab> cutIntoSlabs(const Grids& grids, const Lattice& lattice, int height) {
-  std::vector<Slab> slabs;
-  const ZRange layers = lattice.layers();
-  for (int z = alignedToLeaves(layers).begin; z < layers.end; z += height) {
-    const ZRange core = intersection({z, z + height}, layers);
-    Slab slab{core, core, {}};
-    for (const auto& [name, grid] : grids) {
-      const Layers piece{grid, layers};
-      slab.grids[name] = joinLayers({&piece, 1}, core);
-    }
-    slabs.push_back(slab);
-  }
-  return slabs;
 }
 
 }  // namespace vdbdither::test

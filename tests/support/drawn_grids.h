@@ -1,12 +1,9 @@
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/model/schema.h"
-#include "vdbdither/model/slab.h"
 
 namespace vdbdither::test {
 
@@ -17,9 +14,5 @@ openvdb::Int32Grid::Ptr drawnMaterial(const std::vector<std::vector<std::string>
 
 /// The voxels of `values` that are not 0.
 openvdb::BoolGrid::Ptr solidOf(const openvdb::Int32Grid& values);
-
-/// What a chain would hand on: `grids` on `lattice`, cut into slabs `height` layers high, with
-/// nothing around them.
-std::vector<Slab> cutIntoSlabs(const Grids& grids, const Lattice& lattice, int height);
 
 }  // namespace vdbdither::test

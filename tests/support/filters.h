@@ -32,8 +32,7 @@ void addInputs(Filter& filter, Slab& slab);
 /// What `filter`, planned on these grids, makes of the whole lattice in one slab.
 Grids runWhole(Filter& filter, const Schema& schema);
 
-/// What it makes slab by slab: each of `height` layers, cut at multiples of eight. Every slab gets
-/// its own copy of what the filter declares to read, and nothing but rubbish beyond its reach.
+/// What it makes of slabs of `height` layers, each as `slabFor` gives it.
 std::vector<std::pair<ZRange, Grids>> runInSlabs(Filter& filter, const Schema& schema, int height);
 
 /// The grid `solid` of all those slabs over `box`. Fails the test where one holds voxels outside

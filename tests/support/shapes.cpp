@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace vdbdither::test {
 
@@ -98,6 +99,33 @@ Mesh transformed(Mesh mesh, const Vec3d& degrees, const Vec3d& move) {
     vertex += move;
   }
   return mesh;
+}
+
+Mesh insideOut(Mesh mesh) {
+  for (Mesh::Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
+  return mesh;
+}
+
+Mesh unshared(const Mesh& mesh) {
+  Mesh apart;
+  for (const Mesh::Triangle& t : mesh.triangles) {
+    const auto first = static_cast<std::uint32_t>(apart.vertices.size());
+    for (const std::uint32_t v : t) apart.vertices.push_back(mesh.vertices[v]);
+    apart.triangles.push_back({first, first + 1, first + 2});
+  }
+  return apart;
+}
+
+Mesh pulledApart(const Mesh& mesh, double gap_mm) {
+  Mesh loose = unshared(mesh);
+  for (const Mesh::Triangle& t : loose.triangles) {
+    const Vec3d middle = (loose.vertices[t[0]] + loose.vertices[t[1]] + loose.vertices[t[2]]) / 3;
+    for (const std::uint32_t v : t) {
+      const Vec3d inwards = middle - loose.vertices[v];
+      loose.vertices[v] += inwards * (gap_mm / inwards.length());
+    }
+  }
+  return loose;
 }
 
 }  // namespace vdbdither::test

@@ -19,4 +19,13 @@ Mesh torusMesh(const openvdb::Vec3d& centre, double ring_radius, double tube_rad
 /// `mesh` turned about the axes x, then y, then z (degrees), then moved.
 Mesh transformed(Mesh mesh, const openvdb::Vec3d& degrees, const openvdb::Vec3d& move);
 
+/// `mesh` with every triangle turned round.
+Mesh insideOut(Mesh mesh);
+
+/// `mesh` without shared vertices.
+Mesh unshared(const Mesh& mesh);
+
+/// The same, with every triangle drawn towards its centroid: corners move by `gap_mm`.
+Mesh pulledApart(const Mesh& mesh, double gap_mm);
+
 }  // namespace vdbdither::test

@@ -1,6 +1,6 @@
 #include "tests/support/sinks.h"
 
-#include "tests/support/drawn_grids.h"
+#include "tests/support/slabs.h"
 #include "vdbdither/engine/registry.h"
 
 namespace vdbdither::test {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include <gtest/gtest.h>
 #include <openvdb/tools/Prune.h>
 
 namespace vdbdither::test {
@@ -67,6 +68,19 @@ Lattice latticeAround(const Vec3d& pitch_mm, const Vec3d& extent_mm, double padd
   return {pitch_mm, Vec3d(0.0), CoordBBox(Coord(0) - reach, reach)};
 }
 
+std::vector<ZRange> slabsOf(ZRange layers, int height) {
+  std::vector<ZRange> slabs;
+  for (int begin = alignedToLeaves(layers).begin; begin < layers.end; begin += height)
+    slabs.push_back(intersection({begin, begin + height}, layers));
+  return slabs;
+}
+
+CoordBBox inLayers(CoordBBox box, ZRange layers) {
+  box.min().z() = layers.begin;
+  box.max().z() = layers.end - 1;
+  return box;
+}
+
 FloatGrid::Ptr sampled(const Distance& distance, const Lattice& lattice, double band_mm) {
   const auto band = static_cast<float>(band_mm);
   auto grid = FloatGrid::create(band);
@@ -84,6 +98,25 @@ FloatGrid::Ptr sampled(const Distance& distance, const Lattice& lattice, double 
   }
   openvdb::tools::prune(grid->tree());
   return grid;
+}
+
+int expectHolds(const FloatGrid& grid, const Lattice& lattice, const Distance& truth,
+                double band_mm) {
+  int active = 0;
+  int wrong = 0;
+  for (auto ijk = lattice.box.begin(); ijk && wrong < 5; ++ijk) {
+    const double expected = truth(lattice.position(*ijk));
+    float value = 0;
+    const bool is_active = grid.tree().probeValue(*ijk, value);
+    active += is_active;
+    if (std::abs(std::abs(expected) - band_mm) < 1e-6) continue;
+    const double held = is_active ? expected : std::copysign(band_mm, expected);
+    if (is_active == (std::abs(expected) < band_mm) && std::abs(value - held) <= 1e-6) continue;
+    ++wrong;
+    ADD_FAILURE() << *ijk << (is_active ? " is active and" : " is inactive and") << " holds "
+                  << value << " instead of " << expected;
+  }
+  return active;
 }
 
 namespace {

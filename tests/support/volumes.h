@@ -36,8 +36,19 @@ const std::vector<TestShape>& testShapes();
 Lattice latticeAround(const openvdb::Vec3d& pitch_mm, const openvdb::Vec3d& extent_mm,
                       double padding_mm);
 
+/// `layers` cut into slabs of `height` layers, at multiples of eight.
+std::vector<ZRange> slabsOf(ZRange layers, int height = leaf_layers);
+
+/// The voxels of `box` in a range of layers.
+openvdb::CoordBBox inLayers(openvdb::CoordBBox box, ZRange layers);
+
 /// `surface` on a lattice: active where |d| ≤ `band_mm`, ±`band_mm` elsewhere and in tiles.
 openvdb::FloatGrid::Ptr sampled(const Distance& distance, const Lattice& lattice, double band_mm);
+
+/// Expects that `grid` is active and holds `truth` where that is below `band_mm`, and is inactive
+/// and holds ±`band_mm` elsewhere. Returns how many voxels are active.
+int expectHolds(const openvdb::FloatGrid& grid, const Lattice& lattice, const Distance& truth,
+                double band_mm);
 
 /// A dense array over a box of voxels, for references that shall be plain.
 template <typename T>

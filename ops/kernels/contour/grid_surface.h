@@ -13,32 +13,33 @@
 
 namespace vdbdither {
 
-/// The grids that have a surface as it is printed or meant, the furthest down a chain first.
+/// The grids that have a printed or an intended surface, those that are made last in a chain first.
 inline constexpr std::array<std::string_view, 4> surface_grids{printed_grid, solid_grid,
                                                                displaced_grid, surface_grid};
 
-/// `wanted`, or without it the first of `surface_grids` that `there` holds. Throws DataError where
-/// it is not there.
+/// Returns `wanted`, or without it the first of `surface_grids` that is in `there`. Throws
+/// DataError if there is none.
 std::string chosenSurfaceGrid(std::span<const std::string> there,
                               const std::optional<std::string>& wanted);
 
-/// The surface that a grid stands for: of a bool grid its voxels, of a level set the level 0, of a
-/// fog volume (an occupancy) the level ½.
+/// The surface that a grid represents: the voxels of a bool grid, the level 0 of a level set, the
+/// level ½ of a fog volume (an occupancy).
 class GridSurface {
  public:
-  /// About how many vertices it has in a leaf that it crosses; triangles are twice as many.
+  /// The approximate number of vertices in a leaf that the surface crosses; there are twice as many
+  /// triangles.
   static constexpr double vertices_per_leaf = 55;
 
-  /// `prototype`: a grid of the kind that is to come. `level`: another level, in the grid's own
-  /// unit. Throws DataError where the grid has no surface, or not at that level.
+  /// `prototype` is a grid of the kind to be added. `level` is another level, in the grid's own
+  /// unit. Throws DataError if the grid has no surface, or none at this level.
   GridSurface(const Lattice& lattice, const openvdb::GridBase& prototype,
               std::optional<double> level);
 
-  /// The next layers; see IsoSurface.
+  /// Adds the next layers; see IsoSurface.
   SurfacePiece add(const GridConstPtr& grid, ZRange layers);
   SurfacePiece finish() { return surface_.finish(); }
 
-  /// Which voxels of the layers are inside.
+  /// Returns the voxels of the layers that are inside.
   [[nodiscard]] std::vector<BitLayer> insideOf(const GridConstPtr& grid, ZRange layers) const;
   [[nodiscard]] const BitFrame& frame() const { return surface_.frame(); }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/contour/marching_cubes.h"
@@ -21,10 +22,12 @@ using openvdb::Vec3d;
 
 namespace {
 
-constexpr int word_bits = 64;
-constexpr double least_share = 1.0 / 256;
+using RowsOfSteps = tbb::blocked_range<int>;
 
-/// The word whose bit n is bit n + 1 of a row.
+constexpr int word_bits = 64;
+constexpr double minimum_share = 1.0 / 256;
+
+/// Returns the word whose bit n is bit n + 1 of a row.
 std::uint64_t shiftedDown(const std::uint64_t* row, int word, int words) {
   const std::uint64_t next = word + 1 < words ? row[word + 1] : 0;
   return row[word] >> 1 | next << (word_bits - 1);
@@ -64,14 +67,14 @@ class IsoSurface::Values {
     if (surface.here_) here_.emplace(surface.here_->getConstAccessor());
   }
 
-  /// How far along the line from `from` one step along `axis` the surface lies, 0 … 1.
+  /// Returns where the surface cuts the line from `from` to its neighbour along `axis`, 0 … 1.
   double share(const Coord& from, int axis) {
     if (!surface_.is_field_) return 0.5;
     Coord to = from;
     ++to[axis];
     const double a = scaled(value(from));
     const double b = scaled(value(to));
-    return std::clamp((level_ - a) / (b - a), least_share, 1 - least_share);
+    return std::clamp((level_ - a) / (b - a), minimum_share, 1 - minimum_share);
   }
 
  private:
@@ -92,6 +95,11 @@ class IsoSurface::Values {
   double level_;
   std::optional<openvdb::FloatGrid::ConstAccessor> below_, here_;
 };
+
+void append(Mesh& mesh, const SurfacePiece& piece) {
+  mesh.vertices.insert(mesh.vertices.end(), piece.vertices.begin(), piece.vertices.end());
+  mesh.triangles.insert(mesh.triangles.end(), piece.triangles.begin(), piece.triangles.end());
+}
 
 IsoSurface::IsoSurface(const Lattice& lattice) : lattice_(lattice), frame_(lattice.box) {}
 
@@ -135,7 +143,7 @@ SurfacePiece IsoSurface::addBits(std::vector<BitLayer> bits, ZRange layers) {
   }
   here_layers_ = layers;
   next_layer_ = layers.end;
-  // A few layers at a time, so that what is kept of each stays small.
+  // A few layers at a time, to limit the memory.
   for (std::size_t begin = 0; begin < bits.size(); begin += leaf_layers) {
     const std::size_t end = std::min(bits.size(), begin + leaf_layers);
     std::vector<Layer> made(end - begin);
@@ -153,129 +161,7 @@ SurfacePiece IsoSurface::addBits(std::vector<BitLayer> bits, ZRange layers) {
   return piece;
 }
 
-void IsoSurface::march(std::vector<Step>& steps, SurfacePiece& piece) {
-  const int rows = frame_.rows();
-  const int words = frame_.words();
-  const std::size_t size = last_.inside.size();
-  const auto forEachRow = [&](const auto& visit) {
-    tbb::parallel_for(tbb::blocked_range<int>(0, static_cast<int>(steps.size()) * rows, 64),
-                      [&](const tbb::blocked_range<int>& range) {
-                        for (int n = range.begin(); n != range.end(); ++n)
-                          visit(steps[static_cast<std::size_t>(n / rows)], n % rows);
-                      });
-  };
-
-  // Which lines are cut, and how many in each word.
-  const auto prepare = [size](CutLines& lines) {
-    lines.cut.assign(size, 0);
-    lines.first.assign(size, 0);
-  };
-  for (Step& step : steps) {
-    prepare(step.along_z);
-    prepare(step.upper->along_x);
-    prepare(step.upper->along_y);
-    step.first_triangle.assign(static_cast<std::size_t>(rows), 0);
-  }
-  forEachRow([&](Step& step, int row) {
-    const std::size_t begin = frame_.row(row);
-    const std::uint64_t* lower = step.lower->inside.data() + begin;
-    const std::uint64_t* upper = step.upper->inside.data() + begin;
-    const auto count = [](CutLines& lines, std::size_t at, std::uint64_t cut) {
-      lines.cut[at] = cut;
-      lines.first[at] = static_cast<std::uint32_t>(std::popcount(cut));
-    };
-    for (int word = 0; word < words; ++word) {
-      const std::size_t at = begin + static_cast<std::size_t>(word);
-      count(step.along_z, at, lower[word] ^ upper[word]);
-      count(step.upper->along_x, at, upper[word] ^ shiftedDown(upper, word, words));
-      if (row + 1 < rows) count(step.upper->along_y, at, upper[word] ^ upper[word + words]);
-    }
-    forEachCell(step, row, [&](int, const CubeCase& cube) {
-      step.first_triangle[static_cast<std::size_t>(row)] += cube.triangles.size();
-    });
-  });
-
-  // Numbers for all of them.
-  std::uint64_t vertices = vertex_count_;
-  std::size_t triangles = piece.triangles.size();
-  const auto number = [&](CutLines& lines) {
-    for (std::uint32_t& first : lines.first) {
-      const std::uint32_t cut = first;
-      first = static_cast<std::uint32_t>(vertices);
-      vertices += cut;
-    }
-  };
-  for (Step& step : steps) {
-    number(step.along_z);
-    step.first_of_upper = static_cast<std::uint32_t>(vertices);
-    number(step.upper->along_x);
-    number(step.upper->along_y);
-    for (std::size_t& first : step.first_triangle) triangles += std::exchange(first, triangles);
-  }
-  if (vertices > std::numeric_limits<std::uint32_t>::max())
-    throw DataError("the surface has more than 4294967295 vertices; take fewer --layers");
-
-  const std::uint32_t piece_begin =
-      vertex_count_ - static_cast<std::uint32_t>(piece.vertices.size());
-  piece.vertices.resize(vertices - piece_begin);
-  piece.triangles.resize(triangles);
-  vertex_count_ = static_cast<std::uint32_t>(vertices);
-  piece.open_from = steps.back().first_of_upper;
-
-  tbb::parallel_for(tbb::blocked_range<int>(0, static_cast<int>(steps.size()) * rows, 64),
-                    [&](const tbb::blocked_range<int>& range) {
-                      Values values(*this);
-                      for (int n = range.begin(); n != range.end(); ++n) {
-                        const Step& step = steps[static_cast<std::size_t>(n / rows)];
-                        const int row = n % rows;
-                        emitVertices(step, row, values, piece);
-                        std::size_t next = step.first_triangle[static_cast<std::size_t>(row)];
-                        forEachCell(step, row, [&](int x, const CubeCase& cube) {
-                          std::array<std::uint32_t, 12> vertex{};
-                          forEachBitOf(cube.edges, [&](int edge) {
-                            const int first = edge & 1;
-                            const int second = edge >> 1 & 1;
-                            if (edge < 4) {
-                              const Layer& layer = second ? *step.upper : *step.lower;
-                              vertex[edge] = layer.along_x.vertex(frame_.row(row + first), x);
-                            } else if (edge < 8) {
-                              const Layer& layer = second ? *step.upper : *step.lower;
-                              vertex[edge] = layer.along_y.vertex(frame_.row(row), x + first);
-                            } else {
-                              vertex[edge] =
-                                  step.along_z.vertex(frame_.row(row + second), x + first);
-                            }
-                          });
-                          for (const auto& t : cube.triangles)
-                            piece.triangles[next++] = {vertex[t[0]], vertex[t[1]], vertex[t[2]]};
-                        });
-                      }
-                    });
-}
-
-/// The vertices on the lines of a row.
-void IsoSurface::emitVertices(const Step& step, int row, Values& values,
-                              SurfacePiece& piece) const {
-  const std::uint32_t piece_begin =
-      vertex_count_ - static_cast<std::uint32_t>(piece.vertices.size());
-  const auto emit = [&](const CutLines& lines, int z, int axis) {
-    for (int word = 0; word < frame_.words(); ++word) {
-      const std::size_t at = frame_.row(row) + static_cast<std::size_t>(word);
-      std::uint32_t vertex = lines.first[at] - piece_begin;
-      forEachBitOf(lines.cut[at], [&](int n) {
-        const Coord from(frame_.xBegin() + word * word_bits + n, frame_.yBegin() + row, z);
-        Vec3d index = from.asVec3d();
-        index[axis] += values.share(from, axis);
-        piece.vertices[vertex++] = lattice_.origin_mm + index * lattice_.pitch_mm;
-      });
-    }
-  };
-  emit(step.along_z, step.z, 2);
-  emit(step.upper->along_x, step.z + 1, 0);
-  emit(step.upper->along_y, step.z + 1, 1);
-}
-
-/// Calls visit(x, case) for the cells between a row and the next that the surface passes, in rising
+/// Calls visit(x, case) for the cells that the surface passes between a row and the next, in rising
 /// x.
 template <typename Visit>
 void IsoSurface::forEachCell(const Step& step, int row, const Visit& visit) const {
@@ -304,6 +190,129 @@ void IsoSurface::forEachCell(const Step& step, int row, const Visit& visit) cons
       visit(word * word_bits + x, cases[inside]);
     });
   }
+}
+
+/// Calls work(rows) on all threads for ranges of rows, counted through the steps.
+template <typename Work>
+void IsoSurface::forSomeRows(const std::vector<Step>& steps, const Work& work) const {
+  tbb::parallel_for(RowsOfSteps(0, static_cast<int>(steps.size()) * frame_.rows(), 64), work);
+}
+
+void IsoSurface::march(std::vector<Step>& steps, SurfacePiece& piece) {
+  for (Step& step : steps) {
+    for (CutLines* lines : {&step.along_z, &step.upper->along_x, &step.upper->along_y}) {
+      lines->cut.assign(last_.inside.size(), 0);
+      lines->first.assign(last_.inside.size(), 0);
+    }
+    step.first_triangle.assign(static_cast<std::size_t>(frame_.rows()), 0);
+  }
+  forSomeRows(steps, [&](const RowsOfSteps& rows) {
+    for (int n = rows.begin(); n != rows.end(); ++n)
+      findCuts(steps[static_cast<std::size_t>(n / frame_.rows())], n % frame_.rows());
+  });
+  number(steps, piece);
+  forSomeRows(steps, [&](const RowsOfSteps& rows) {
+    Values values(*this);
+    for (int n = rows.begin(); n != rows.end(); ++n) {
+      const Step& step = steps[static_cast<std::size_t>(n / frame_.rows())];
+      emitVertices(step, n % frame_.rows(), values, piece);
+      emitTriangles(step, n % frame_.rows(), piece);
+    }
+  });
+}
+
+/// Finds the cut lines of a row, counts them by word, and counts its triangles.
+void IsoSurface::findCuts(Step& step, int row) const {
+  const int words = frame_.words();
+  const std::size_t begin = frame_.row(row);
+  const std::uint64_t* lower = step.lower->inside.data() + begin;
+  const std::uint64_t* upper = step.upper->inside.data() + begin;
+  const auto count = [](CutLines& lines, std::size_t at, std::uint64_t cut) {
+    lines.cut[at] = cut;
+    lines.first[at] = static_cast<std::uint32_t>(std::popcount(cut));
+  };
+  for (int word = 0; word < words; ++word) {
+    const std::size_t at = begin + static_cast<std::size_t>(word);
+    count(step.along_z, at, lower[word] ^ upper[word]);
+    count(step.upper->along_x, at, upper[word] ^ shiftedDown(upper, word, words));
+    if (row + 1 < frame_.rows()) count(step.upper->along_y, at, upper[word] ^ upper[word + words]);
+  }
+  forEachCell(step, row, [&](int, const CubeCase& cube) {
+    step.first_triangle[static_cast<std::size_t>(row)] += cube.triangles.size();
+  });
+}
+
+/// Turns counts of cut lines and of triangles into the indices of the first, and resizes the piece.
+void IsoSurface::number(std::vector<Step>& steps, SurfacePiece& piece) {
+  std::uint64_t vertices = vertex_count_;
+  std::size_t triangles = piece.triangles.size();
+  const auto number_lines = [&](CutLines& lines) {
+    for (std::uint32_t& first : lines.first) {
+      const std::uint32_t cut = first;
+      first = static_cast<std::uint32_t>(vertices);
+      vertices += cut;
+    }
+  };
+  for (Step& step : steps) {
+    number_lines(step.along_z);
+    step.first_of_upper = static_cast<std::uint32_t>(vertices);
+    number_lines(step.upper->along_x);
+    number_lines(step.upper->along_y);
+    for (std::size_t& first : step.first_triangle) triangles += std::exchange(first, triangles);
+  }
+  if (vertices > std::numeric_limits<std::uint32_t>::max())
+    throw DataError("the surface has more than 4294967295 vertices; take fewer --layers");
+
+  const std::uint32_t piece_begin =
+      vertex_count_ - static_cast<std::uint32_t>(piece.vertices.size());
+  piece.vertices.resize(vertices - piece_begin);
+  piece.triangles.resize(triangles);
+  vertex_count_ = static_cast<std::uint32_t>(vertices);
+  piece.open_from = steps.back().first_of_upper;
+}
+
+/// Writes the vertices on the lines of a row.
+void IsoSurface::emitVertices(const Step& step, int row, Values& values,
+                              SurfacePiece& piece) const {
+  const std::uint32_t piece_begin =
+      vertex_count_ - static_cast<std::uint32_t>(piece.vertices.size());
+  const auto emit = [&](const CutLines& lines, int z, int axis) {
+    for (int word = 0; word < frame_.words(); ++word) {
+      const std::size_t at = frame_.row(row) + static_cast<std::size_t>(word);
+      std::uint32_t vertex = lines.first[at] - piece_begin;
+      forEachBitOf(lines.cut[at], [&](int n) {
+        const Coord from(frame_.xBegin() + word * word_bits + n, frame_.yBegin() + row, z);
+        Vec3d index = from.asVec3d();
+        index[axis] += values.share(from, axis);
+        piece.vertices[vertex++] = lattice_.origin_mm + index * lattice_.pitch_mm;
+      });
+    }
+  };
+  emit(step.along_z, step.z, 2);
+  emit(step.upper->along_x, step.z + 1, 0);
+  emit(step.upper->along_y, step.z + 1, 1);
+}
+
+/// Writes the triangles of the cells between a row and the next.
+void IsoSurface::emitTriangles(const Step& step, int row, SurfacePiece& piece) const {
+  std::size_t next = step.first_triangle[static_cast<std::size_t>(row)];
+  forEachCell(step, row, [&](int x, const CubeCase& cube) {
+    std::array<std::uint32_t, 12> vertex{};
+    forEachBitOf(cube.edges, [&](int edge) {
+      const int first = edge & 1;
+      const int second = edge >> 1 & 1;
+      const Layer& layer = second ? *step.upper : *step.lower;
+      if (edge < 4) {
+        vertex[edge] = layer.along_x.vertex(frame_.row(row + first), x);
+      } else if (edge < 8) {
+        vertex[edge] = layer.along_y.vertex(frame_.row(row), x + first);
+      } else {
+        vertex[edge] = step.along_z.vertex(frame_.row(row + second), x + first);
+      }
+    });
+    for (const auto& t : cube.triangles)
+      piece.triangles[next++] = {vertex[t[0]], vertex[t[1]], vertex[t[2]]};
+  });
 }
 
 }  // namespace vdbdither

@@ -1,3 +1,6 @@
+// Lorensen, Cline: "Marching Cubes: A High Resolution 3D Surface Construction Algorithm",
+// SIGGRAPH 1987.
+
 #include "ops/kernels/contour/marching_cubes.h"
 
 #include <limits>
@@ -14,7 +17,7 @@ using Loop = std::vector<int>;
 
 int bit(int corner, int axis) { return corner >> axis & 1; }
 
-/// The edge between two corners that differ along one axis.
+/// Returns the edge between two corners that differ along one axis.
 int edgeBetween(int a, int b) {
   const int low = a & b;
   switch (a ^ b) {
@@ -27,7 +30,7 @@ int edgeBetween(int a, int b) {
   }
 }
 
-/// The middle of an edge, in half cells.
+/// Returns the middle of an edge, in half cells.
 std::array<int, 3> middle(int edge) {
   const int axis = edge / 4;
   const int u = axis == 0 ? 1 : 0;
@@ -39,8 +42,8 @@ std::array<int, 3> middle(int edge) {
   return at;
 }
 
-/// What a diagonal between two edges costs: its squared length, or too much where it lies in a
-/// face.
+/// Returns the cost of a diagonal between two edges: its squared length, or a prohibitive value if
+/// it lies in a face.
 double diagonalCost(int a, int b) {
   const auto p = middle(a);
   const auto q = middle(b);
@@ -52,7 +55,7 @@ double diagonalCost(int a, int b) {
   return length2;
 }
 
-/// Cuts the polygon into triangles whose diagonals cost least in all.
+/// Cuts the polygon into triangles with the minimum sum of costs of their diagonals.
 void triangulate(const Loop& loop, CubeCase& made) {
   const std::size_t n = loop.size();
   std::vector<std::vector<double>> cost(n, std::vector<double>(n, 0));
@@ -87,7 +90,7 @@ void triangulate(const Loop& loop, CubeCase& made) {
   }
 }
 
-/// Which edge follows which on the boundary of the surface, face by face.
+/// Returns for each edge the next one on the boundary of the surface, face by face.
 std::array<int, edge_count> edgesInOrder(int inside) {
   std::array<int, edge_count> next{};
   next.fill(-1);
@@ -104,7 +107,7 @@ std::array<int, edge_count> edgesInOrder(int inside) {
       const auto isInside = [&](std::size_t i) { return bit(inside, corner(i)) == 1; };
       for (std::size_t leave = 0; leave < 4; ++leave) {
         if (!isInside(leave) || isInside(leave + 1)) continue;
-        // The stretch of outside corners that begins here is cut off by itself.
+        // The sequence of outside corners that begins here is cut off on its own.
         std::size_t enter = leave + 1;
         while (!isInside(enter + 1)) ++enter;
         next[static_cast<std::size_t>(edgeBetween(corner(enter), corner(enter + 1)))] =

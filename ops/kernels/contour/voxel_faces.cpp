@@ -33,7 +33,8 @@ SurfacePiece VoxelFaces::finish() {
 }
 
 void VoxelFaces::emit(const BitLayer& above, SurfacePiece& piece) {
-  // One axis of a face's normal and its sign; the other two follow so that it faces outwards.
+  // Adds the face whose normal is `sign` times `axis`; the other two axes are ordered so that it
+  // faces outwards.
   const auto face = [&](int x, int y, int axis, int sign) {
     if (vertices_ > std::numeric_limits<std::uint32_t>::max() - 4)
       throw DataError("the voxels have more faces than 32 bits count; take fewer layers");

@@ -8,18 +8,19 @@
 
 namespace vdbdither {
 
-/// The faces between voxels of a set and what is not of it, layer by layer: the set as a heap of
-/// blocks. Two triangles a face, which face outwards; faces share no vertices, but what meets has
-/// equal coordinates. Above the last layer and below the first all counts as empty.
+/// Makes the faces between voxels of a set and voxels outside it, layer by layer: the set drawn as
+/// blocks. Each face is two triangles that face outwards. Faces do not share vertices, but their
+/// common corners have equal coordinates. Everything above the last layer and below the first
+/// counts as empty.
 class VoxelFaces {
  public:
   explicit VoxelFaces(const Lattice& lattice) : lattice_(lattice), frame_(lattice.box) {}
 
   [[nodiscard]] const BitFrame& frame() const { return frame_; }
 
-  /// Takes layer `z`, the next one above that before: gives the faces of the one before.
+  /// Takes layer `z`, the one above the last. Returns the faces of the layer below it.
   SurfacePiece add(BitLayer layer, int z);
-  /// The faces of the last layer.
+  /// Returns the faces of the last layer.
   SurfacePiece finish();
 
  private:

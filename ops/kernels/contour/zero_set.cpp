@@ -1,3 +1,5 @@
+// Gibson: "Constrained elastic surface nets", MICCAI 1998.
+
 #include "ops/kernels/contour/zero_set.h"
 
 #include <algorithm>
@@ -19,8 +21,8 @@ namespace {
 constexpr int block_edge = 8;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// The cell between eight nodes: their values, < 0 inside, and second differences along each axis.
-/// Corner n lies at (n & 1, n >> 1 & 1, n >> 2).
+/// The cell between eight nodes: their values, < 0 inside, and their second differences along each
+/// axis. Corner n lies at (n & 1, n >> 1 & 1, n >> 2).
 struct Cell {
   std::array<double, 8> value;
   std::array<std::array<double, 8>, 3> bend;
@@ -30,18 +32,18 @@ struct Cell {
            std::none_of(value.begin(), value.end(), [](double v) { return v < 0; });
   }
 
-  /// Whether the interpolant may change its sign: no bend lifts or lowers it by more than an
-  /// eighth.
+  /// Whether the interpolant may change its sign; second differences change it by at most an eighth
+  /// of them.
   [[nodiscard]] bool maybeCrossed() const {
     if (!uniform()) return true;
-    double most = 0;
+    double bend = 0;
     for (const auto& along : bend) {
-      double greatest = 0;
-      for (const double b : along) greatest = std::max(greatest, std::abs(b));
-      most += greatest / 8;
+      double maximum = 0;
+      for (const double b : along) maximum = std::max(maximum, std::abs(b));
+      bend += maximum / 8;
     }
     return std::any_of(value.begin(), value.end(),
-                       [&](double v) { return std::abs(v) <= most * (1 + 1e-9); });
+                       [&](double v) { return std::abs(v) <= bend * (1 + 1e-9); });
   }
 
   struct Sample {
@@ -49,14 +51,14 @@ struct Cell {
     Vec3d gradient{0, 0, 0};  ///< per index
   };
 
-  /// At `t` in [0, 1]³. The same bits from both sides of a face that two cells share: what is of
-  /// the other side is multiplied by an exact zero.
+  /// Returns the sample at `t` in [0, 1]³. It has the same bits on both sides of a face between two
+  /// cells: terms of the other side are multiplied by an exact zero.
   [[nodiscard]] Sample at(const Vec3d& t) const {
     std::array<std::array<double, 2>, 3> weight, lift, lift_slope;
     for (std::size_t a = 0; a < 3; ++a) {
       const double u = t[static_cast<int>(a)];
       weight[a] = {1 - u, u};
-      // Of the cubic through four nodes, written with the second differences at the inner two.
+      // The cubic through four nodes, expressed by the second differences at the inner two.
       lift[a] = {-u * (1 - u) * (2 - u) / 6, -u * (1 - u) * (1 + u) / 6};
       lift_slope[a] = {-(2 - 6 * u + 3 * u * u) / 6, -(1 - 3 * u * u) / 6};
     }
@@ -104,7 +106,7 @@ std::size_t volumeOf(int edge) {
   return n * n * n;
 }
 
-/// The place of `ijk` in an array over a cube.
+/// Returns the index of `ijk` in an array over a cube.
 std::size_t placeOf(const Coord& ijk, int edge) {
   return static_cast<std::size_t>((ijk.x() * edge + ijk.y()) * edge + ijk.z());
 }
@@ -115,7 +117,7 @@ struct Node {
   bool active = false;
 };
 
-/// The cell at `origin`; `probe` gives the nodes.
+/// Returns the cell at `origin`, whose nodes `probe` reads.
 template <typename Probe>
 Cell cellAt(const Coord& origin, const Probe& probe) {
   Cell cell{};
@@ -133,7 +135,7 @@ Cell cellAt(const Coord& origin, const Probe& probe) {
   return cell;
 }
 
-/// Reads nodes one by one. For one thread.
+/// Reads nodes one by one, for one thread.
 class NodeReader {
  public:
   NodeReader(const openvdb::FloatTree& tree, ZeroSet::Reading reading)
@@ -151,7 +153,7 @@ class NodeReader {
   double sign_;
 };
 
-/// The nodes of a block of cells, with one more below and two above.
+/// The nodes of a block of cells, with one more layer below and two above.
 class NodeTile {
  public:
   NodeTile(const Coord& origin, const NodeReader& reader) : first_(origin.offsetBy(-1)) {
@@ -167,7 +169,7 @@ class NodeTile {
   std::array<Node, std::size_t{edge} * edge * edge> nodes_;
 };
 
-/// The least and the greatest z that an affine map gives a box.
+/// Returns the minimum and the maximum z of a box under an affine map.
 std::pair<double, double> heights(const Mat4d& map, const Vec3d& min, const Vec3d& max) {
   double low = map(3, 2);
   double high = low;
@@ -179,7 +181,8 @@ std::pair<double, double> heights(const Mat4d& map, const Vec3d& min, const Vec3
   return {low, high};
 }
 
-/// Where the edges of a division are crossed, on average: its corners' values, in [0, 1]³.
+/// Returns the mean of the crossings on the edges of a division, in [0, 1]³, from its corners'
+/// values.
 Vec3d meanCrossing(const std::array<double, 8>& value) {
   Vec3d sum(0, 0, 0);
   int count = 0;
@@ -196,7 +199,8 @@ Vec3d meanCrossing(const std::array<double, 8>& value) {
   return sum / count;
 }
 
-/// A point of the surface in a division that it passes, from four steps of Newton's. In the cell.
+/// Returns a point of the surface in a division that it passes, in coordinates of the cell, by four
+/// steps of Newton's method.
 Vec3d vertexIn(const Cell& cell, const Vec3d& division, int divisions,
                const std::array<double, 8>& corners) {
   const Vec3d low = division / divisions;
@@ -212,7 +216,7 @@ Vec3d vertexIn(const Cell& cell, const Vec3d& division, int divisions,
   return at;
 }
 
-/// Two triangles, parted along the shorter diagonal.
+/// Adds two triangles, divided by the shorter diagonal.
 void addQuad(const std::vector<Vec3d>& vertices, const std::array<std::int64_t, 4>& quad,
              std::vector<Mesh::Triangle>& triangles) {
   std::array<std::uint32_t, 4> q;
@@ -230,10 +234,10 @@ void addQuad(const std::vector<Vec3d>& vertices, const std::array<std::int64_t, 
 
 }  // namespace
 
-/// What the surface is in a leaf-sized block of cells.
+/// The surface in a leaf-sized block of cells.
 struct ZeroSet::Block {
   std::vector<std::uint8_t> inside;  ///< by node of the divisions
-  std::vector<std::int32_t> vertex;  ///< by division its place in `vertices`, or −1
+  std::vector<std::int32_t> vertex;  ///< by division: the index in `vertices`, or −1
   std::vector<Vec3d> vertices;       ///< index space
 };
 
@@ -283,8 +287,8 @@ double ZeroSet::memoryBytes() const {
 
 Vec3d ZeroSet::positionMm(const Vec3d& index) const { return mm_from_index_.transform(index); }
 
-/// The blocks of cells that have a node in a leaf, or on the rim of a tile that is inside: nowhere
-/// else do signs change.
+/// Returns the blocks of cells that have a node in a leaf or on the rim of an inside tile: signs
+/// change nowhere else.
 std::vector<Coord> ZeroSet::candidates() const {
   std::vector<Coord> origins;
   const auto add = [&](const Coord& origin) {
@@ -324,7 +328,7 @@ ZeroSet::Block ZeroSet::blockAt(const Coord& origin) const {
     int like_first = 0;
     for (std::size_t n = 0; n < 8; ++n)
       like_first += (nodes(at + cornerOf(n)).value < 0) == first_inside ? 1 : 0;
-    // Undivided, a cell has no nodes but its corners.
+    // An undivided cell has no other nodes than its corners.
     if (like_first == 8 && (divisions_ == 1 || !cellAt(at, nodes).maybeCrossed())) {
       if (first_inside) inside.push_back(local);
     } else {
@@ -366,7 +370,7 @@ ZeroSet::Block ZeroSet::blockAt(const Coord& origin) const {
 }
 
 Mesh ZeroSet::triangles(double low_mm, double high_mm) const {
-  // A triangle reaches no farther than two divisions from the cells of its vertices.
+  // A triangle reaches at most two divisions beyond the cells of its vertices.
   const double slack_mm = 4 * half_division_mm_;
   std::vector<Coord> origins;
   std::copy_if(
@@ -431,7 +435,7 @@ Mesh ZeroSet::triangles(double low_mm, double high_mm) const {
   return mesh;
 }
 
-/// The cells that were read last.
+/// The cells read last.
 struct ZeroSet::Feet::Cache {
   struct Entry {
     Coord origin = Coord::max();
@@ -458,9 +462,9 @@ ZeroSet::Feet::~Feet() = default;
 
 double ZeroSet::Feet::distanceMm(const Vec3d& position_mm, const Vec3d& foot_mm,
                                  double distance_mm) {
-  // Each step shortens what is off by the distance over the radius that the surface bends with.
+  // Each step multiplies the error by the distance divided by the surface's radius of curvature.
   constexpr int steps = 3;
-  const double most_mm = surface_.half_division_mm_;
+  const double maximum_mm = surface_.half_division_mm_;
   double better_mm = distance_mm;
   Vec3d foot = foot_mm;
   for (int step = 0; step < steps; ++step) {
@@ -475,8 +479,8 @@ double ZeroSet::Feet::distanceMm(const Vec3d& position_mm, const Vec3d& foot_mm,
     const double steepness = slope.length();
     const Vec3d normal = slope / steepness;
     const double next_mm = normal.dot(position_mm - foot) + sample.value / steepness;
-    // Where the surface has a crease or no slope, steps lead nowhere.
-    if (!(std::abs(next_mm - distance_mm) <= most_mm)) break;
+    // At a crease, or where the slope is zero, steps do not converge.
+    if (!(std::abs(next_mm - distance_mm) <= maximum_mm)) break;
     better_mm = next_mm;
     foot = position_mm - normal * next_mm;
   }

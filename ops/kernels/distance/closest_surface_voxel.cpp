@@ -1,10 +1,10 @@
 // Eq. (4) of Morsy, Brunton, Urban: Shape Dithering for 3D Printing, ACM Transactions on Graphics
 // 41(4), 2022.
 //
-// The surface voxels around a leaf are kept as bits, one word per column along z. A search walks
+// The surface voxels around a leaf are stored as bits, one word per column along z. A search visits
 // the columns by rising lateral distance, finds the nearest bits above and below with two bit
-// scans, and ends as soon as the lateral distance alone exceeds the best: near the surface that is
-// after a handful of columns.
+// scans, and ends when the lateral distance alone exceeds the best: near the surface, after a few
+// columns.
 
 #include "ops/kernels/distance/closest_surface_voxel.h"
 
@@ -22,7 +22,7 @@ using openvdb::Coord;
 
 namespace {
 
-/// A leaf's worth of distances of one sign, which stands in for a tile.
+/// The distances of a leaf that are all equal; they take the place of a tile.
 constexpr std::array<float, 512> leafOf(float d) {
   std::array<float, 512> values{};
   values.fill(d);
@@ -31,7 +31,7 @@ constexpr std::array<float, 512> leafOf(float d) {
 constexpr std::array<float, 512> tile_inside = leafOf(-1);
 constexpr std::array<float, 512> tile_outside = leafOf(1);
 
-/// The inside voxels of a layer across z, eight columns: bit 8·y.
+/// The inside voxels of the lowest layer of a plane of equal x: bit 8·y.
 std::uint64_t layerInside(const float* values) {
   std::uint64_t word = 0;
   for (unsigned y = 0; y < 8; ++y) word |= std::uint64_t{values[8 * y] < 0.0F} << (8 * y);
@@ -40,7 +40,7 @@ std::uint64_t layerInside(const float* values) {
 
 constexpr int nowhere = std::numeric_limits<int>::max();
 
-/// How far below bit `z` of a column the nearest set bit is: 0 for the bit itself.
+/// Returns how many bits below bit `z` of a column the nearest set bit is: 0 for the bit itself.
 int stepsDown(const std::uint64_t* column, int z) {
   int word = z / 64;
   if (const std::uint64_t bits = column[word] << (63 - z % 64)) return std::countl_zero(bits);
@@ -50,7 +50,7 @@ int stepsDown(const std::uint64_t* column, int z) {
   return nowhere;
 }
 
-/// The same above.
+/// The same upwards.
 int stepsUp(const std::uint64_t* column, int words, int z) {
   int word = z / 64;
   if (const std::uint64_t bits = column[word] >> (z % 64)) return std::countr_zero(bits);

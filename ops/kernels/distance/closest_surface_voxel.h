@@ -11,15 +11,15 @@
 
 namespace vdbdither {
 
-/// ∂V, one leaf at a time: the voxels of V = { d < 0 } that have a 6-neighbour outside V.
+/// Finds ∂V one leaf at a time: the voxels of V = { d < 0 } that have a 6-neighbour outside V.
 class SurfaceVoxels {
  public:
-  /// `surface`: d in mm; inactive voxels and tiles count by their sign. Layers outside `valid` are
-  /// outside V.
+  /// `surface` holds d in mm; of inactive voxels and tiles only the sign counts. Layers outside
+  /// `valid` are outside V.
   SurfaceVoxels(const openvdb::FloatTree& surface, ZRange valid)
       : surface_(surface), valid_(valid) {}
 
-  /// ∂V among the voxels of `leaf`, a leaf of the tree.
+  /// Returns ∂V among the voxels of `leaf`, a leaf of the tree.
   [[nodiscard]] LeafBits operator()(const FloatLeaf& leaf);
 
  private:
@@ -29,17 +29,17 @@ class SurfaceVoxels {
   ZRange valid_;
 };
 
-/// Eq. (4), v̄ = argmin over u in ∂V of ‖c(v) − c(u)‖₂, within a radius: what every search on one
-/// lattice shares.
+/// Eq. (4), v̄ = argmin over u in ∂V of ‖c(v) − c(u)‖₂, within a radius: the part of the search
+/// that depends on the lattice alone.
 ///
 /// The squared distance of voxels (di, dj, dk) apart is (di·dx)² + (dj·dy)² + (dk·dz)² in double
-/// precision, summed in this order; among equals the smallest (k, j, i) wins. Voxels farther than
-/// the radius are not found.
+/// precision, summed in this order; of equally near voxels the one with the smallest (k, j, i) is
+/// found. Voxels farther than the radius are not found.
 class SearchDisk {
  public:
   SearchDisk(const openvdb::Vec3d& pitch_mm, double radius_mm);
 
-  /// How many voxels away along each axis one may be found.
+  /// The maximum number of voxels along each axis to a voxel that can be found.
   [[nodiscard]] const openvdb::Coord& halo() const { return halo_; }
 
  private:
@@ -47,7 +47,7 @@ class SearchDisk {
   struct Column {
     double lateral2;  ///< (di·dx)² + (dj·dy)²
     int i, j;
-    int offset;  ///< in the words of a tile
+    int offset;  ///< in words of a tile
   };
 
   double radius2_;
@@ -61,8 +61,8 @@ class SearchDisk {
 /// Finds v̄ for the voxels of one leaf at a time.
 class ClosestSurfaceVoxel {
  public:
-  /// `surface_voxels`: its active voxels are ∂V; what they hold is what the search brings back.
-  /// Both must outlive the search.
+  /// The active voxels of `surface_voxels` are ∂V; the search returns the values that they hold.
+  /// Both arguments must outlive the search.
   ClosestSurfaceVoxel(const openvdb::FloatTree& surface_voxels, const SearchDisk& disk);
 
   struct Found {
@@ -70,15 +70,14 @@ class ClosestSurfaceVoxel {
     float value;
   };
 
-  /// Turns to the leaf at `origin`; false where no leaf around it that the radius reaches holds a
+  /// Moves the search to the leaf at `origin`. Returns false if no leaf within the radius holds a
   /// surface voxel.
   bool visit(const openvdb::Coord& origin);
 
-  /// The leaves that the radius reaches from the visited one, null where there are no surface
-  /// voxels.
+  /// The leaves within the radius of the visited one, null where there are no surface voxels.
   [[nodiscard]] const std::vector<const FloatLeaf*>& leaves() const { return leaves_; }
 
-  /// v̄ of the voxel at `offset` in the leaf, nothing where none is within the radius.
+  /// Returns v̄ of the voxel at `offset` in the leaf, or nothing if none is within the radius.
   [[nodiscard]] std::optional<Found> operator()(unsigned offset);
 
  private:

@@ -7,14 +7,14 @@
 
 namespace vdbdither {
 
-/// A hole to be drilled: a cylinder with flat ends.
+/// A hole through a shell: a cylinder with flat ends.
 struct Drain {
   openvdb::Vec3d centre_mm;
   openvdb::Vec3d direction;  ///< of unit length
   double radius_mm = 0;
   double half_length_mm = 0;
 
-  /// Signed distance in mm to its surface, negative inside; exact.
+  /// Returns the signed distance to the surface of the cylinder in mm, negative inside; exact.
   [[nodiscard]] double distanceMm(const openvdb::Vec3d& position_mm) const {
     const openvdb::Vec3d from_centre = position_mm - centre_mm;
     const double along_mm = from_centre.dot(direction);

@@ -49,7 +49,7 @@ inline Floats root(Floats values) {
 #endif
 }
 
-/// The normals of four voxels, the first of them at `at`, by component.
+/// By component, the normals of four voxels, the first at `at`.
 inline std::array<Floats, 3> unitGradients(const float* at, const openvdb::Vec3f& per_pitch) {
   const Floats x = slope(at, LeafSurroundings::stride_x, per_pitch[0]);
   const Floats y = slope(at, LeafSurroundings::stride_y, per_pitch[1]);

@@ -15,7 +15,7 @@ HeightMap::HeightMap(std::vector<float> heights_mm, int width, int height, int a
       up_(axis == 2 ? 1 : 2),
       pixel_mm_(pixel_mm),
       corner_mm_(corner_mm),
-      least_mm_(double{*std::min_element(heights_mm_.begin(), heights_mm_.end())}),
+      minimum_mm_(double{*std::min_element(heights_mm_.begin(), heights_mm_.end())}),
       greatest_mm_(double{*std::max_element(heights_mm_.begin(), heights_mm_.end())}) {}
 
 double HeightMap::at(const openvdb::Vec3d& position_mm) const {

@@ -7,23 +7,22 @@
 
 namespace vdbdither {
 
-/// Heights in mm over a plane, projected along an axis and repeated without end.
+/// Heights in mm over a plane, projected along an axis and repeated in both directions.
 class HeightMap {
  public:
-  /// \param heights_mm  row by row, the top first
-  /// \param axis        along which it is projected, 0 … 2; its rows run along the first of the
-  /// other
-  ///                    two axes and its columns up the second
-  /// \param pixel_mm    edge of a pixel
-  /// \param corner_mm   where the lower left corner of the image lies, on the two other axes
+  /// \param heights_mm  row by row, the top row first
+  /// \param axis  of the projection, 0 … 2; of the other two axes, rows run along the first and
+  /// columns up the second
+  /// \param pixel_mm  the edge of a pixel
+  /// \param corner_mm  the lower left corner of the image, on the other two axes
   HeightMap(std::vector<float> heights_mm, int width, int height, int axis, double pixel_mm,
             const openvdb::Vec2d& corner_mm);
 
-  /// Bilinear between the centres of pixels.
+  /// Returns the height, interpolated bilinearly between the centres of pixels.
   [[nodiscard]] double at(const openvdb::Vec3d& position_mm) const;
 
-  /// The least and the greatest height.
-  [[nodiscard]] double leastMm() const { return least_mm_; }
+  /// The minimum and the maximum height.
+  [[nodiscard]] double leastMm() const { return minimum_mm_; }
   [[nodiscard]] double greatestMm() const { return greatest_mm_; }
 
  private:
@@ -32,7 +31,7 @@ class HeightMap {
   int across_, up_;  ///< the axes
   double pixel_mm_;
   openvdb::Vec2d corner_mm_;
-  double least_mm_, greatest_mm_;
+  double minimum_mm_, greatest_mm_;
 };
 
 }  // namespace vdbdither

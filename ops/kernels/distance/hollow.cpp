@@ -14,7 +14,7 @@ using openvdb::Vec3d;
 
 namespace {
 
-/// The drains that come nearer than `band_mm` to a voxel of the leaf.
+/// Returns the drains that are nearer than `band_mm` to a voxel of the leaf.
 std::vector<Drain> drainsNear(std::span<const Drain> drains, const Lattice& lattice,
                               const Coord& origin, double band_mm) {
   const Vec3d half_mm = 0.5 * (leaf_layers - 1) * lattice.pitch_mm;
@@ -62,7 +62,7 @@ openvdb::FloatGrid::Ptr hollowed(const openvdb::FloatGrid& surface, const Lattic
         if ((ties[offset / 64] >> (offset % 64) & 1U) != 0)
           under = trendOfTie(around.at(offset), lattice.pitch_mm) > 0 ? -tied_mm : tied_mm;
         double shell = std::max(d, under);
-        // Of a distance that is not known only the side counts: outside, or in the cavity.
+        // Where the distance is unknown only the side is: outside the part, or in the cavity.
         if (!(values.active[offset / 64] >> (offset % 64) & 1U)) shell = background_mm;
         for (const Drain& drain : near) {
           const double beside =

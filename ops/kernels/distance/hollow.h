@@ -9,16 +9,16 @@
 
 namespace vdbdither {
 
-/// A shell under the surface: max(d, −(d + thickness)), less the drains.
+/// Returns a shell under the surface, max(d, −(d + thickness)), minus the drains.
 ///
-/// Its inner surface is a zero set of its own, with true distances from the side of the cavity and,
-/// within the shell, all but behind the re-entrant edges of `combined`. A voxel whose distance is
-/// not known is beyond the shell on its side. A centre on the inner surface is inside where the
-/// shell is at the point shifted by (ε, ε³, ε²).
+/// The inner surface is a zero set with true distances in the cavity and, within the shell,
+/// everywhere except behind re-entrant edges; see `combined`. A voxel whose distance is unknown
+/// counts as beyond the shell on its side. A centre on the inner surface is inside if the shell is
+/// at the point shifted by (ε, ε³, ε²).
 ///
-/// \param valid          the layers of `surface` that may be read
-/// \param surface        d in mm; holds thickness_mm + background_mm
-/// \param background_mm  of the result: how far from its surfaces distances are kept
+/// \param surface  d in mm, held up to thickness_mm + background_mm
+/// \param background_mm  of the result: the distance up to which it holds distances
+/// \param valid  the layers of `surface` that may be read
 openvdb::FloatGrid::Ptr hollowed(const openvdb::FloatGrid& surface, const Lattice& lattice,
                                  double thickness_mm, std::span<const Drain> drains,
                                  float background_mm, ZRange core, ZRange valid);

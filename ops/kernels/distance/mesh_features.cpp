@@ -1,9 +1,9 @@
-// Distance by characteristic regions: every point of space has its nearest point of the mesh on a
-// face whose prism holds it, on an edge whose wedge holds it, or on a vertex whose cone holds it
-// (S. Mauch, "A fast algorithm for computing the closest point and distance transform", Caltech
-// 2000). The regions used here are the intersections of half-spaces that the first-order condition
-// gives for any set of triangles, so they are right for open and non-manifold meshes too: a wedge
-// lies beyond every face of its edge, a cone beyond every edge of its vertex.
+// Distance by characteristic regions: the point of the mesh nearest to any point in space lies on a
+// face whose prism holds that point, on an edge whose wedge holds it, or on a vertex whose cone
+// holds it (S. Mauch, "A fast algorithm for computing the closest point and distance transform",
+// Caltech 2000). The regions are the intersections of half-spaces that follow from the first-order
+// condition for any set of triangles, so that they are right for open and non-manifold meshes too:
+// a wedge lies beyond every face of its edge, a cone beyond every edge of its vertex.
 
 #include "ops/kernels/distance/mesh_features.h"
 
@@ -23,14 +23,14 @@ using openvdb::Vec3d;
 
 namespace {
 
-/// How far regions reach over their borders, mm: far above the rounding at 1 m, below what a
-/// distance may err. What is thinner needs no region of its own.
+/// How far regions reach beyond their borders, mm: far above the rounding at 1 m, and below the
+/// tolerance of distances. Thinner features need no region.
 constexpr double slack_mm = 1e-7;
 
-/// Triangles lower than this are told by their edges alone.
+/// Triangles lower than this are represented by their edges alone.
 constexpr double least_height_mm = 1e-7;
 
-/// The most that the surface may bend at an edge or a vertex which faces answer for.
+/// The maximum bend at an edge or a vertex that faces represent.
 constexpr double greatest_bend = 0.06;
 constexpr double abrupt = 2;
 
@@ -44,12 +44,13 @@ LinearForm formThrough(const Vec3d& gradient, const Vec3d& point) {
   return {gradient, -gradient.dot(point)};
 }
 
-/// The half-space `gradient` points into from `point`, a little widened.
+/// Returns the half-space into which `gradient` points from `point`, widened a little.
 LinearForm halfSpace(const Vec3d& gradient, const Vec3d& point) {
   return {gradient, slack_mm * manhattanLength(gradient) - gradient.dot(point)};
 }
 
-/// Unit normal, of slivers from the longest side and the height on it, which stays accurate.
+/// Returns the unit normal; for slivers from the longest side and the height on it, which stays
+/// accurate.
 Vec3d faceNormal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   std::array<Vec3d, 3> corners{a, b, c};
   const std::array<double, 3> lengths{(b - a).lengthSqr(), (c - b).lengthSqr(),
@@ -132,10 +133,11 @@ void MeshFeatures::findNeighbours() {
   }
 }
 
-/// The sine of half the angle between the two faces at an edge; `abrupt` where there are others.
+/// Returns the sine of half the angle between the two faces at an edge, or `abrupt` if it does not
+/// have two faces.
 ///
-/// A point nearest to the edge lies in a direction between the faces' normals, and this is the most
-/// that the nearer of them differs from it.
+/// A point nearest to the edge lies in a direction between the normals of the faces; this is the
+/// maximum difference from the nearer one.
 double MeshFeatures::bendAtEdge(std::uint32_t edge) const {
   const auto halves = edges_.halves(edge);
   if (halves.size() != 2) return abrupt;
@@ -146,19 +148,20 @@ double MeshFeatures::bendAtEdge(std::uint32_t edge) const {
   return 0.5 * (a - b).length();
 }
 
-/// The same of a vertex with faces all around it.
+/// Returns the same for a vertex with faces all around it.
 ///
-/// Let their normals n differ from their mean N by an angle of at most φ, so that seen along N the
-/// surface at the vertex is a function f with the faces' gradients. A point nearest to the vertex
-/// lies in the direction (−r, 1) of a plane that bounds it, r · x ≥ f(x) for all x, or in that of
-/// one from below. Were r not between the gradients, some x would have g · x > r · x for all of
-/// them, and so f(x) > r · x. So the direction is a sum of normals, u = s Σ λ n with s ≤ 1 / cos φ:
-/// were it further than φ from all of them, u · u = s Σ λ n · u would come to less than 1.
+/// Let the normals n of the faces differ from their mean N by an angle of at most φ. Seen along N,
+/// the surface at the vertex is then a function f with the gradients of the faces. A point nearest
+/// to the vertex lies in the direction (−r, 1) of a plane that bounds f from above, r · x ≥ f(x)
+/// for all x, or of one that bounds it from below. If r were not between the gradients g, some x
+/// would have g · x > r · x for all of them, and so f(x) > r · x. The direction is therefore a sum
+/// of normals, u = s Σ λ n with s ≤ 1 / cos φ. If it differed from all of them by more than φ, then
+/// u · u = s Σ λ n · u would be less than 1.
 double MeshFeatures::bendAtVertex(std::uint32_t vertex, const std::vector<float>& at_edge) const {
   const std::span around(vertex_edges_.data() + first_edge_[vertex],
                          first_edge_[vertex + 1] - first_edge_[vertex]);
   Vec3d mean(0, 0, 0);
-  // Every edge is the beginning of one face's corner at the vertex.
+  // At the vertex, the corner of exactly one face begins with each edge.
   const auto normalAfter = [&](std::uint32_t edge) -> const Vec3d& {
     const auto halves = edges_.halves(edge);
     const bool first = mesh_.triangles[halves[0] / 3][halves[0] % 3] == vertex;
@@ -174,7 +177,7 @@ double MeshFeatures::bendAtVertex(std::uint32_t vertex, const std::vector<float>
   return cosine > 0 ? std::sqrt(std::max(0.0, 1 - cosine * cosine)) : abrupt;
 }
 
-/// Gives every triangle the edges and vertices that it answers for, and its share of the rest.
+/// Assigns to every triangle the edges and vertices that it owns, and the bend of the others.
 void MeshFeatures::findOwned() {
   const auto vertices = static_cast<std::uint32_t>(mesh_.vertices.size());
   const auto triangles = static_cast<std::uint32_t>(mesh_.triangles.size());
@@ -194,7 +197,7 @@ void MeshFeatures::findOwned() {
     for (std::uint32_t i = first_edge_[v]; i < first_edge_[v + 1]; ++i)
       owner[v] = std::min(owner[v], edges_.halves(vertex_edges_[i]).front() / 3);
   });
-  // Hidden triangles have none.
+  // Hidden triangles own none.
   tbb::parallel_for(std::uint32_t{0}, features_, [&](std::uint32_t t) {
     const auto look = [&](float bend, bool first, unsigned bit) {
       if (bend <= greatest_bend) {
@@ -214,8 +217,8 @@ void MeshFeatures::findOwned() {
   });
 }
 
-/// The mesh with its triangles in order and its vertices as they first occur in them, so that what
-/// is used together lies together; those that no triangle has are left out.
+/// Returns the mesh with its triangles in order and its vertices in the order of their first use,
+/// so that data used together lies together. Unused vertices are omitted.
 Mesh MeshFeatures::sorted(const Mesh& mesh, const SwallowedWalls& walls, const Vec3d& origin_mm,
                           double layer_mm, double row_mm) {
   Mesh sorted;
@@ -336,7 +339,7 @@ MeshFeature MeshFeatures::describeFace(std::uint32_t triangle) const {
   face.rank = 1;
   face.bounds = 3;
   face.distance[0] = formThrough(n, corner(triangle, 0));
-  // Of every distance asked for, so that no voxel's lot depends on the block it is made in.
+  // The same for all distances, so that no voxel depends on the block in which it is made.
   face.spread_mm = slack_mm + greatest_mm_ * double{bend_[triangle]};
   for (int side = 0; side < 3; ++side) {
     const Vec3d& a = corner(triangle, side);
@@ -360,7 +363,7 @@ MeshFeature MeshFeatures::describeEdge(std::uint32_t index) const {
   feature.max = componentMax(a, b);
   feature.below = feature.above = Vec3d(1, 1, 1);
   const double length = (b - a).length();
-  if (!(length > 0)) return feature;  // its two vertices stand for it
+  if (!(length > 0)) return feature;  // its two vertices represent it
   const Vec3d along = (b - a) / length;
 
   feature.rank = 2;
@@ -392,7 +395,7 @@ MeshFeature MeshFeatures::describeEdge(std::uint32_t index) const {
     const Vec3d second = outwards[0].dot(normals[1]) < 0 ? -normals[1] : normals[1];
     const double cosine = first.dot(second);
     if (cosine > 0.1) {
-      // No direction between the two reaches further along an axis than one of them or `tip`.
+      // No direction between the two reaches farther along an axis than one of them or `tip`.
       const Vec3d middle = first + second;
       const Vec3d tip = middle * (1 / (1 + cosine));
       const Vec3d none(0, 0, 0);
@@ -466,7 +469,7 @@ Vec3d MeshFeatures::leastNormal(std::uint32_t triangle) const {
   return least;
 }
 
-/// One without area comes last: it has no normal.
+/// A triangle without area comes last, because it has no normal.
 bool MeshFeatures::comesBefore(std::uint32_t one, std::uint32_t other) const {
   const auto place = [&](std::uint32_t triangle) {
     return std::pair(normals_[triangle] == Vec3d(0, 0, 0), original_[triangle]);

@@ -21,42 +21,42 @@ struct LinearForm {
   [[nodiscard]] double at(const openvdb::Vec3d& p) const { return gradient.dot(p) + constant; }
 };
 
-/// A face, an edge or a vertex of a mesh, as the distance to it is computed.
+/// A face, an edge or a vertex of a mesh, in the form in which distances to it are computed.
 ///
 /// The squared distance from p to the feature's plane, line or point is the sum of `rank` squared
-/// forms. It is the distance to the feature itself where every bound is at least zero, and the
-/// nearest point of the whole mesh can lie on this feature only there.
+/// forms. Where every bound is at least zero, this is the distance to the feature itself; only
+/// there can the nearest point of the mesh lie on the feature.
 struct MeshFeature {
   static constexpr int max_bounds = 16;
 
-  int rank = 0;  ///< 1 face, 2 edge, 3 vertex; 0 for a face without area, which its edges stand for
+  int rank = 0;  ///< 1 face, 2 edge, 3 vertex; 0 for a face without area, which its edges represent
   int bounds = 0;
   std::array<LinearForm, 3> distance;  ///< in mm
   std::array<LinearForm, max_bounds> bound;
-  /// Where it has one, a form in mm that is nowhere in the region above the distance.
+  /// If `capped`, a form in mm that never exceeds the distance in the region.
   LinearForm cap;
   bool capped = false;
-  /// A side of a face: how far a point of its plane is beyond it and along it, mm.
+  /// A side of a face: how far a point of the plane lies beyond it and along it, mm.
   struct Side {
     LinearForm outward, along;
     double length_mm;
   };
-  /// Of a face, the first three bounds being the sides'. It answers for its smooth edges and
-  /// corners too: its region reaches `spread_mm` beyond its sides.
+  /// The sides of a face; its first three bounds are theirs. A face also represents its smooth
+  /// edges and corners: its region reaches `spread_mm` beyond its sides.
   std::array<Side, 3> side;
   double spread_mm = 0;
   openvdb::Vec3d min, max;  ///< bounding box of the feature, mm
   openvdb::Vec3d below,
-      above;  ///< the region within distance b lies from min − b·below to max + b·above
+      above;  ///< within distance b: min − b·below to max + b·above
 };
 
 /// The triangles of a mesh in rising order of their lowest layer, then row, and the faces, edges
-/// and vertices that each answers for: every edge and vertex belongs to the first of its triangles.
+/// and vertices that each owns: every edge and vertex belongs to the first of its triangles.
 ///
-/// Any set of triangles will do. Where triangles share vertices the regions of neighbours hardly
-/// overlap, so that the work of a distance field follows its voxels instead of its triangles. Edges
-/// and vertices where the surface hardly bends have no region of their own: the points that are
-/// nearest to them lie so little beyond the sides of the faces there that these reach further.
+/// The triangles can be any. If they share vertices, the regions of neighbours hardly overlap, so
+/// that the work for a distance field depends on its voxels, not on its triangles. Edges and
+/// vertices at which the surface is almost flat have no region: the points nearest to them lie so
+/// close to the sides of the faces that the regions of the faces are widened instead.
 class MeshFeatures {
  public:
   enum class Kind : std::uint32_t { face, edge, vertex };
@@ -66,7 +66,7 @@ class MeshFeatures {
     Id(Kind kind, std::uint32_t index) : packed_(index << 2 | static_cast<std::uint32_t>(kind)) {}
     explicit Id(std::uint32_t packed) : packed_(packed) {}
     [[nodiscard]] Kind kind() const { return static_cast<Kind>(packed_ & 3); }
-    /// Of the triangle, the edge or the vertex.
+    /// The index of the triangle, the edge or the vertex.
     [[nodiscard]] std::uint32_t index() const { return packed_ >> 2; }
     [[nodiscard]] std::uint32_t packed() const { return packed_; }
 
@@ -77,10 +77,9 @@ class MeshFeatures {
     double low, high;
   };
 
-  /// `mesh` in mm, of which a sorted copy is kept; positions are taken relative to `origin_mm`.
-  /// `layer_mm` and `row_mm` are the sizes of the bins along z and y that the order is made by.
-  /// Distances above `greatest_mm` are not asked for. Triangles that `walls` hides have no
-  /// features, the pieces that are left of them have.
+  /// Keeps a sorted copy of `mesh` (mm), with positions relative to `origin_mm`. `layer_mm` and
+  /// `row_mm` are the sizes of the bins along z and y that define the order. Distances above
+  /// `greatest_mm` are not needed. Triangles that `walls` hides have no features; their pieces do.
   MeshFeatures(const Mesh& mesh, const SwallowedWalls& walls, const openvdb::Vec3d& origin_mm,
                double layer_mm, double row_mm, double greatest_mm);
 
@@ -90,18 +89,18 @@ class MeshFeatures {
     return static_cast<std::uint32_t>(mesh_.triangles.size());
   }
 
-  /// The triangles that meet the layers [low, high] mm, in order. A triangle's number is its place
-  /// in the order.
+  /// Returns the triangles that meet the layers [low, high] mm, in order. A triangle is identified
+  /// by its place in the order.
   [[nodiscard]] std::vector<std::uint32_t> collect(double low, double high) const;
 
-  /// Whether rows that cross the triangle enter or leave the solid; not for pieces.
+  /// Whether rows that cross the triangle enter or leave the solid; false for pieces.
   [[nodiscard]] bool bounds(std::uint32_t triangle) const {
     return triangle < whole_ || triangle >= features_;
   }
   /// Whether distances are measured to the triangle.
   [[nodiscard]] bool hasFeatures(std::uint32_t triangle) const { return triangle < features_; }
 
-  /// What a triangle takes along an axis.
+  /// Returns the extent of a triangle along an axis.
   [[nodiscard]] Extent extent(std::uint32_t triangle, int axis) const {
     const Mesh::Triangle& t = mesh_.triangles[triangle];
     const double a = mesh_.vertices[t[0]][axis];
@@ -110,8 +109,8 @@ class MeshFeatures {
     return {std::min(std::min(a, b), c), std::max(std::max(a, b), c)};
   }
 
-  /// Calls visit(id) for the features that the triangle answers for, but those that no distance is
-  /// needed from.
+  /// Calls visit(id) for the features that the triangle owns, except those to which no distance is
+  /// needed.
   template <class Visit>
   void visit(std::uint32_t triangle, const Visit& visit) const {
     const std::uint8_t owned = owned_[triangle];
@@ -122,7 +121,8 @@ class MeshFeatures {
       if (owned >> (3 + corner) & 1) visit(Id(Kind::vertex, mesh_.triangles[triangle][corner]));
   }
 
-  /// Whether the feature's bounding box meets the layers and rows [low, high] mm; any face does.
+  /// Whether the feature's bounding box meets the layers and rows [low, high] mm; always true for a
+  /// face.
   [[nodiscard]] bool meets(Id id, const openvdb::Vec3d& low, const openvdb::Vec3d& high) const {
     if (id.kind() == Kind::face) return true;
     const bool edge = id.kind() == Kind::edge;
@@ -134,30 +134,30 @@ class MeshFeatures {
 
   [[nodiscard]] MeshFeature describe(Id id) const;
 
-  /// What lies nearest to a point.
+  /// The point of a feature nearest to a given one.
   struct Nearest {
-    openvdb::Vec3d away;  ///< from there to the point
-    /// Of the triangles that the face, edge or vertex belongs to the one first in the mesh given,
-    /// of those with area if there are any.
+    openvdb::Vec3d away;  ///< from the nearest point to the given one
+    /// The first triangle, in the mesh given, that the face, edge or vertex belongs to; one with
+    /// area if there is any.
     std::uint32_t triangle;
   };
-  /// Of the feature, whose region `p` is in.
+  /// Returns the nearest point of the feature, whose region must hold `p`.
   [[nodiscard]] Nearest nearest(Id id, const openvdb::Vec3d& p) const;
 
-  /// Corner `corner` of a triangle, relative to the origin.
+  /// Returns a corner of a triangle, relative to the origin.
   [[nodiscard]] const openvdb::Vec3d& corner(std::uint32_t triangle, int corner) const {
     return mesh_.vertices[mesh_.triangles[triangle][static_cast<std::size_t>(corner)]];
   }
-  /// Unit normal, counter-clockwise; zero for a face without area.
+  /// Returns the unit normal, counter-clockwise; zero for a face without area.
   [[nodiscard]] const openvdb::Vec3d& normal(std::uint32_t triangle) const {
     return normals_[triangle];
   }
 
-  /// What the components of the normals of a triangle's face and of its three edges' wedges come to
-  /// at least.
+  /// Returns by component the minimum magnitude of the normals of a triangle's face and of the
+  /// wedges at its three edges.
   [[nodiscard]] openvdb::Vec3d leastNormal(std::uint32_t triangle) const;
 
-  /// The number that a triangle has in the mesh that was given.
+  /// Returns the index of a triangle in the mesh that was given.
   [[nodiscard]] std::uint32_t original(std::uint32_t triangle) const { return original_[triangle]; }
 
  private:
@@ -178,18 +178,18 @@ class MeshFeatures {
   [[nodiscard]] MeshFeature describeVertex(std::uint32_t index) const;
 
   // Whole triangles come first, then pieces, then hidden triangles.
-  std::uint32_t whole_ = 0;              ///< end of the first
-  std::uint32_t features_ = 0;           ///< and of the second
+  std::uint32_t whole_ = 0;              ///< the end of the whole triangles
+  std::uint32_t features_ = 0;           ///< the end of the pieces
   std::vector<std::uint32_t> original_;  ///< by triangle
   Mesh mesh_;
   std::vector<openvdb::Vec3d> normals_;
   MeshEdges edges_;
-  std::vector<std::uint32_t> first_edge_;  ///< by vertex, and the end of the last
+  std::vector<std::uint32_t> first_edge_;  ///< by vertex; one more entry ends the last
   std::vector<std::uint32_t> vertex_edges_;
   std::vector<std::uint32_t> side_edges_;  ///< by half-edge
   std::vector<std::uint8_t> owned_;        ///< by triangle: bits of its sides, then of its corners
   double greatest_mm_;
-  std::vector<float> bend_;     ///< by triangle: the most at its smooth edges and corners
+  std::vector<float> bend_;     ///< by triangle: the maximum at its smooth edges and corners
   std::vector<Extent> blocks_;  ///< of every `block_size` triangles in order
 };
 

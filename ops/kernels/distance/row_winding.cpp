@@ -8,7 +8,8 @@ LeafBits RowWinding::advance(const LeafDistances& noted, std::size_t slot) {
   LeafBits inside;
   inside.fill(bits_);
   if (!noted.noted(slot)) return inside;
-  // Rows of a plane that enter and leave; the few that do so more than once wait in `again`.
+  // The rows that enter and leave in each plane; crossings of the few rows with more than one are
+  // kept in `again`.
   std::array<LeafBits, 2> once{};
   std::vector<std::uint32_t> again;
   noted.visitNotes(slot, [&](std::uint32_t crossing) {

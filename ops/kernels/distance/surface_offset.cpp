@@ -1,3 +1,6 @@
+// Brunton, Abu Rmaileh: "Displaced signed distance fields for additive manufacturing", ACM
+// Transactions on Graphics 40(4), 2021.
+
 #include "ops/kernels/distance/surface_offset.h"
 
 #include <algorithm>
@@ -27,23 +30,23 @@ namespace {
 
 using Accessor = openvdb::tree::ValueAccessor<const FloatTree, false>;
 
-/// h at a voxel or at a point. For one thread.
+/// Reads h at a voxel or at a point, for one thread.
 class Heights {
  public:
-  Heights(const SurfaceOffset& offset, const FloatGrid* grid, std::atomic<float>& greatest)
-      : offset_(offset), greatest_(greatest) {
+  Heights(const SurfaceOffset& offset, const FloatGrid* grid, std::atomic<float>& maximum)
+      : offset_(offset), maximum_(maximum) {
     if (grid) grid_.emplace(grid->tree());
   }
   Heights(Heights&&) = default;
   ~Heights() {
-    float known = greatest_.load();
-    while (known < seen_ && !greatest_.compare_exchange_weak(known, seen_)) {
+    float known = maximum_.load();
+    while (known < seen_ && !maximum_.compare_exchange_weak(known, seen_)) {
     }
   }
 
   double at(const Coord& ijk) { return at(ijk, offset_.lattice.position(ijk)); }
 
-  /// At a point in the voxel `ijk`.
+  /// Returns h at a point in the voxel `ijk`.
   double at(const Coord& ijk, const Vec3d& position_mm) {
     double height_mm = offset_.constant_mm;
     if (offset_.map) height_mm += offset_.map->at(position_mm);
@@ -59,19 +62,19 @@ class Heights {
  private:
   const SurfaceOffset& offset_;
   std::optional<Accessor> grid_;
-  std::atomic<float>& greatest_;
+  std::atomic<float>& maximum_;
   float seen_ = 0;
 };
 
-/// h on ∂V, active at its voxels.
+/// Returns h on ∂V, active at its voxels.
 FloatTree surfaceHeights(const SurfaceOffset& offset, const FloatTree& surface,
                          const FloatGrid* grid, ZRange layers, ZRange valid,
-                         std::atomic<float>& greatest) {
+                         std::atomic<float>& maximum) {
   FloatTree heights(0.0F);
   addLeaves(heights, leavesIn(surface, layers), [&] {
     return
         [surface_voxels = SurfaceVoxels(surface, valid),
-         read = std::make_shared<Heights>(offset, grid, greatest)](const FloatLeaf& leaf) mutable {
+         read = std::make_shared<Heights>(offset, grid, maximum)](const FloatLeaf& leaf) mutable {
           const LeafBits bits = surface_voxels(leaf);
           if (bits == no_bits) return std::unique_ptr<FloatLeaf>();
           auto made = std::make_unique<FloatLeaf>(leaf.origin(), 0.0F);
@@ -87,13 +90,13 @@ FloatTree surfaceHeights(const SurfaceOffset& offset, const FloatTree& surface,
 }  // namespace
 
 double SurfaceOffset::greatestMm() const {
-  double least = constant_mm - grid_limit_mm;
-  double most = constant_mm + grid_limit_mm;
+  double minimum = constant_mm - grid_limit_mm;
+  double maximum = constant_mm + grid_limit_mm;
   if (map) {
-    least += map->leastMm();
-    most += map->greatestMm();
+    minimum += map->leastMm();
+    maximum += map->greatestMm();
   }
-  return std::max(std::abs(least), std::abs(most));
+  return std::max(std::abs(minimum), std::abs(maximum));
 }
 
 SurfaceOffset::Layers SurfaceOffset::reach() const {
@@ -113,9 +116,9 @@ FloatGrid::Ptr SurfaceOffset::run(const FloatGrid& surface, const FloatGrid* hei
   origins.reserve(sources.size());
   for (const FloatLeaf* leaf : sources) origins.push_back(leaf->origin());
   std::vector<LeafValues> leaves(sources.size());
-  std::atomic<float> greatest = 0;
+  std::atomic<float> maximum = 0;
 
-  /// `make_reader()` makes for one thread a function from a leaf, an offset and d to h.
+  /// `make_reader()` returns, for one thread, a function from a leaf, an offset and d to h.
   const auto displace = [&](const auto& make_reader) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {
       const Accessor accessor(surface.tree());
@@ -171,12 +174,12 @@ FloatGrid::Ptr SurfaceOffset::run(const FloatGrid& surface, const FloatGrid* hei
     };
     displace([&] {
       return AtFoot{LeafNormals(surface.tree(), lattice.pitch_mm, valid), *this,
-                    std::make_shared<Heights>(*this, heights, greatest)};
+                    std::make_shared<Heights>(*this, heights, maximum)};
     });
   } else {
     const SearchDisk disk(lattice.pitch_mm, searchRadiusMm());
     const FloatTree of_surface = surfaceHeights(
-        *this, surface.tree(), heights, grownWithin(core, disk.halo().z(), valid), valid, greatest);
+        *this, surface.tree(), heights, grownWithin(core, disk.halo().z(), valid), valid, maximum);
     struct AtClosest {
       double constant_mm;
       ClosestSurfaceVoxel closest;
@@ -189,8 +192,8 @@ FloatGrid::Ptr SurfaceOffset::run(const FloatGrid& surface, const FloatGrid* hei
     };
     displace([&] { return AtClosest{constant_mm, ClosestSurfaceVoxel(of_surface, disk)}; });
   }
-  if (from_grid && !(double{greatest.load()} <= grid_limit_mm * (1 + 1e-6)))
-    throw DataError("the grid of offsets holds one of " + std::to_string(greatest.load()) +
+  if (from_grid && !(double{maximum.load()} <= grid_limit_mm * (1 + 1e-6)))
+    throw DataError("the grid of offsets holds one of " + std::to_string(maximum.load()) +
                     " mm, and --most is " + std::to_string(grid_limit_mm) + " mm");
   return surfaceOf(surface, backgroundMm(), core, origins, leaves,
                    insideTiles(surface.tree(), core));

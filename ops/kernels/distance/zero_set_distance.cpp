@@ -19,8 +19,9 @@ using openvdb::Vec3d;
 namespace {
 
 Band widened(const Band& band, const Vec3d& pitch_mm, double slack_mm) {
-  const double least_mm = std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
-  return band.mm > 0 ? Band{0, band.mm + slack_mm} : Band{band.diameters + slack_mm / least_mm, 0};
+  const double minimum_mm = std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
+  return band.mm > 0 ? Band{0, band.mm + slack_mm}
+                     : Band{band.diameters + slack_mm / minimum_mm, 0};
 }
 
 /// What single precision leaves open of positions in such a box.
@@ -45,7 +46,7 @@ ZeroSetDistance::ZeroSetDistance(std::shared_ptr<const ZeroSet> surface, const L
 std::shared_ptr<const MeshDistance> ZeroSetDistance::chunk(int index) const {
   const std::lock_guard lock(mutex_);
   if (last_ && last_index_ == index) return last_;
-  // More than the reach of a feature in MeshDistance.
+  // More than a feature's reach in MeshDistance.
   const double around_mm = 2 * backgroundMm() + 3 * lattice_.diagonalMm();
   const double low_mm = index * chunk_layers * lattice_.pitch_mm.z() + lattice_.origin_mm.z();
   const Mesh mesh = surface_->triangles(low_mm - around_mm,
@@ -67,7 +68,7 @@ FloatGrid::Ptr ZeroSetDistance::run(ZRange core) const {
     if (!result) {
       result = made.surface;
     } else {
-      // Chunks share no leaf, so that nothing is there yet.
+      // Chunks share no leaf, so that the tree is still empty there.
       for (const openvdb::CoordBBox& box : insideTiles(made.surface->tree(), range))
         result->tree().sparseFill(box, -result->background(), false);
       std::vector<FloatTree::LeafNodeType*> leaves;

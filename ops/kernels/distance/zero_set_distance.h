@@ -9,24 +9,26 @@
 
 namespace vdbdither {
 
-/// Signed distance in mm from a zero set, on any lattice, made slab by slab: that from the mesh
-/// which it is turned into says where the nearest point is about, and steps on the interpolant the
-/// rest. What is inside, the mesh decides, but for voxels that are on its surface. The bits do not
-/// depend on how the layers are cut into runs.
+/// Signed distance in mm from a zero set, on any lattice, made slab by slab. The distance from a
+/// mesh of the zero set gives the approximate nearest point; steps on the interpolant refine it.
+/// The mesh also decides the sign, except of voxels on its surface. The result does not depend on
+/// how the layers are divided into runs.
 class ZeroSetDistance {
  public:
-  /// `band`: as mesh2sdf's; what is held is wider by `slack_mm`, by which the mesh may be off.
+  /// `band` is that of mesh2sdf; the band held is wider by `slack_mm`, the maximum error of the
+  /// mesh.
   ZeroSetDistance(std::shared_ptr<const ZeroSet> surface, const Lattice& lattice, const Band& band,
                   double slack_mm);
 
-  /// The grid `surface` over the layers of `core`. Const, in any order; cheapest upwards.
+  /// Returns the grid `surface` over the layers of `core`. Can be called in any order, but is
+  /// fastest upwards.
   [[nodiscard]] openvdb::FloatGrid::Ptr run(ZRange core) const;
 
   [[nodiscard]] double backgroundMm() const { return wide_.greatestMm(lattice_.pitch_mm); }
 
  private:
-  /// A mesh is made for so many layers at once, whatever is asked for: its bits are those of the
-  /// chunk alone.
+  /// A mesh is always made for this many layers at once, so that its bits depend on the chunk
+  /// alone.
   static constexpr int chunk_layers = 64;
 
   [[nodiscard]] std::shared_ptr<const MeshDistance> chunk(int index) const;

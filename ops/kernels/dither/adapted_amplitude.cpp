@@ -1,3 +1,6 @@
+// The displacement and its constant are eq. (5) of Morsy, Brunton, Urban: Shape Dithering for 3D
+// Printing, ACM Transactions on Graphics 41(4), 2022. docs/evaluation.md has the measurements.
+
 #include "ops/kernels/dither/adapted_amplitude.h"
 
 #include <algorithm>
@@ -18,38 +21,38 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-/// The levels of each that are tried; with more, errors fall by less than a per cent.
+/// The levels that are tried; more of them reduce the errors by less than a per cent.
 constexpr std::array checkers{0.0, 0.5, 1.0};
 constexpr std::array amplitudes{0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0};
 constexpr std::size_t combinations = checkers.size() * amplitudes.size();
-constexpr std::size_t plain = 0;  ///< the first of them, nothing of either
+constexpr std::size_t plain = 0;  ///< the first combination: plain voxels
 
-/// Both must be able to act without leaving the voxel.
+/// Whether both together stay within the voxel.
 constexpr bool isAllowed(double checker, double amplitude) {
   return checker + amplitude <= 2 && (checker > 0 || amplitude != 0.25);
 }
 
-/// How much more the variance of the stairs counts than that of the grain, for lines are seen where
-/// grain is not. Against 1, with 3 the mean error rises by 1 % up to 10° and by 5 % beyond, and a
-/// third of the stairs goes. More than that moves hardly any of the angles where the thresholds
-/// give way to the checkerboard.
+/// The weight of the variance of the stairs, relative to that of the grain: lines are visible where
+/// grain is not. Compared with 1, a weight of 3 raises the mean error by 1 % up to 10° and by 5 %
+/// beyond, and removes a third of the stairs. Larger weights hardly move the angles at which the
+/// checkerboard replaces the thresholds.
 constexpr double stairs_weight = 3;
 
-/// What is left of the variance of white noise after the blur, measured on facets of every tilt
-/// with the default mask. At the constant 2 it rises with the facet's slope in voxels, for the mask
-/// is bluest in the lattice planes, and with the share of a voxel's face in the blur; at smaller
-/// constants fewer thresholds are in play, and what they leave of a blue mask is whiter. The
-/// checkerboard hides every other one: hardly any blue is left.
+/// The share of white noise's variance that remains after the blur, measured on facets of every
+/// tilt with the default mask. At the constant 2 it rises with the facet's slope in voxels, because
+/// the mask is bluest in the lattice planes, and with the share of a voxel's face in the blur. At
+/// smaller constants fewer thresholds have an effect, and what they leave of a blue mask is whiter.
+/// The checkerboard hides every other threshold, so that hardly any blue remains.
 constexpr double blue_noise_flat = 0.05;
 constexpr double blue_noise_per_face = 0.14;
 constexpr double blue_noise_per_slope = 0.7;
 constexpr double blue_noise_steep = 0.6;
 constexpr double checkered_noise = 0.9;
 
-/// Waves of more cycles than this per voxel diameter, along the normal, are left out: their height
-/// is below a hundredth of a diameter. They do count up to there, for on special slopes, such as 1
-/// in 6, a high one is as long as the facet while the first stairs are blurred away.
-constexpr double most_cycles = 16;
+/// The maximum of cycles per voxel diameter, along the normal, up to which waves count; beyond,
+/// their height is below a hundredth of a diameter. High waves matter: on special slopes, such as 1
+/// in 6, one can be as long as the facet while the first stairs are blurred away.
+constexpr double maximum_cycles = 16;
 
 /// Errors below this share of a voxel's diameter count as none.
 constexpr double negligible_share = 0.01;
@@ -78,10 +81,10 @@ class Facet {
   }
 
   [[nodiscard]] FacetDither best() const {
-    std::array<double, blurs> least;
-    least.fill(std::numeric_limits<double>::infinity());
+    std::array<double, blurs> minimum;
+    minimum.fill(std::numeric_limits<double>::infinity());
     forEachAllowed([&](std::size_t n, const FacetDither&) {
-      for (int b = 0; b < blurs; ++b) least[b] = std::min(least[b], weighed(b, n));
+      for (int b = 0; b < blurs; ++b) minimum[b] = std::min(minimum[b], weighed(b, n));
     });
 
     FacetDither best;
@@ -89,7 +92,8 @@ class Facet {
     forEachAllowed([&](std::size_t n, const FacetDither& dither) {
       double excess = 0;
       for (int b = 0; b < blurs; ++b)
-        excess = std::max(excess, (weighed(b, n) + negligible_mm2_) / (least[b] + negligible_mm2_));
+        excess =
+            std::max(excess, (weighed(b, n) + negligible_mm2_) / (minimum[b] + negligible_mm2_));
       if (excess < best_excess) {
         best_excess = excess;
         best = dither;
@@ -106,8 +110,8 @@ class Facet {
     return stairs_weight * stairs_[b][n] + grain_[b][n];
   }
 
-  /// Calls `visit` with each combination, and its number, that stays within the voxel and that is
-  /// not worse than plain voxels after either blur, all errors counted alike.
+  /// Calls `visit` with each combination, and its number, that stays within the voxel and is not
+  /// worse than plain voxels after either blur, with all errors weighted equally.
   template <typename Visit>
   void forEachAllowed(const Visit& visit) const {
     std::size_t n = 0;
@@ -123,8 +127,9 @@ class Facet {
     }
   }
 
-  /// The reciprocal vectors near the normal: what lies beyond is blurred away. One of G and −G; in
-  /// halves, whole vectors have even indices, those of the checkerboard odd ones.
+  /// Adds the stairs of the reciprocal vectors near the normal; others are blurred away. Uses one
+  /// of G and −G. Indices count halves: whole vectors have even ones, those of the checkerboard odd
+  /// ones.
   void addStairs() {
     const double reach = std::sqrt(no_trace) / spread_mm_;
     const int axis = dominantAxis(normal_);
@@ -132,8 +137,8 @@ class Facet {
     const int c = (axis + 2) % 3;
     const double cosine = std::abs(normal_[axis]);
     const double halves =
-        2 * pitch_mm_[axis] * (most_cycles / (2 * half_diameter_mm_) * cosine + reach);
-    // Where the layer at this index cuts the cylinder of that radius around the normal.
+        2 * pitch_mm_[axis] * (maximum_cycles / (2 * half_diameter_mm_) * cosine + reach);
+    // The span in which the layer at this index cuts the cylinder of that radius around the normal.
     struct Span {
       int first, last;
     };
@@ -166,7 +171,7 @@ class Facet {
     const double lateral2 = lateral.lengthSqr();
     if (lateral2 * spread_mm_ * spread_mm_ > no_trace) return;
     const double cycles = std::abs(along) * 2 * half_diameter_mm_;
-    if (cycles < 1e-6 || cycles > most_cycles) return;
+    if (cycles < 1e-6 || cycles > maximum_cycles) return;
 
     double height_mm = 1 / (2 * pi * along);
     for (int axis = 0; axis < 3; ++axis) height_mm *= sinc(lateral[axis] * pitch_mm_[axis]);
@@ -192,7 +197,7 @@ class Facet {
   void addGrain() {
     for (int b = 0; b < blurs; ++b) {
       const double blur_mm2 = 4 * pi * blurMm(b) * blurMm(b);
-      // Of one voxel, spread over the facet.
+      // The error of one voxel, spread over the facet.
       const double step_mm2 = 2 * half_diameter_mm_ * pitch_mm_.product() / blur_mm2;
       const double blue = blueNoise(blurMm(b));
       std::size_t n = 0;
@@ -210,7 +215,7 @@ class Facet {
     }
   }
 
-  /// What the mask keeps of white noise's variance at the constant 2.
+  /// The share of white noise's variance that the mask keeps at the constant 2.
   [[nodiscard]] double blueNoise(double blur_mm) const {
     const double face_mm2 = pitch_mm_.product() / pitch_mm_[dominantAxis(normal_ / pitch_mm_)];
     const Vec3d steps = openvdb::math::Abs(normal_ * pitch_mm_);
@@ -221,7 +226,7 @@ class Facet {
                     blue_noise_steep);
   }
 
-  /// In lateral cycles² per blur²: exp(−4π²·0.3) is 7e-6.
+  /// Lateral cycles² per blur² that leave no trace: exp(−4π²·0.3) is 7e-6.
   static constexpr double no_trace = 0.3;
 
   Vec3d normal_;
@@ -233,7 +238,7 @@ class Facet {
   std::array<Errors, blurs> grain_{};
 };
 
-/// Cells per slope. They are narrow where slopes are small, for there the stairs change fastest.
+/// Cells per slope. They are narrower at small slopes, where the stairs change fastest.
 constexpr int slope_cells = 64;
 
 double slopeOf(int cell) { return std::pow((cell + 0.5) / slope_cells, 2); }

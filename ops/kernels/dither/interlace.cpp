@@ -1,3 +1,6 @@
+// Eq. (11) of Morsy, Brunton, Urban: Shape Dithering for 3D Printing, ACM Transactions on
+// Graphics 41(4), 2022.
+
 #include "ops/kernels/dither/interlace.h"
 
 #include <algorithm>
@@ -18,7 +21,7 @@ namespace {
 
 using Accessor = openvdb::tree::ValueAccessor<const FloatTree, false>;
 
-/// V among the 8³ voxels at `origin`, be they a leaf or part of a tile.
+/// Returns V among the 8³ voxels at `origin`, which are a leaf or part of a tile.
 LeafBits insideBitsAt(Accessor& surface, const Coord& origin, ZRange layers) {
   const std::uint8_t row = rowWithin(origin.z(), layers);
   if (const FloatLeaf* leaf = surface.probeConstLeaf(origin)) return insideBits(*leaf, row);
@@ -27,8 +30,8 @@ LeafBits insideBitsAt(Accessor& surface, const Coord& origin, ZRange layers) {
   return bits;
 }
 
-/// Four rows of the plain lattice from eight refined ones: the even rows on even slices, the odd
-/// ones on odd slices.
+/// Returns four rows of the plain lattice from eight refined ones: the even rows on even slices,
+/// the odd rows on odd slices.
 std::uint32_t pickedRows(std::uint64_t refined) {
   std::uint32_t picked = 0;
   for (unsigned j = 0; j < 4; ++j) {
@@ -39,15 +42,15 @@ std::uint32_t pickedRows(std::uint64_t refined) {
   return picked;
 }
 
-/// The plain leaf that a refined one falls into; refined leaves come in pairs along y.
+/// Returns the plain leaf that holds a refined one; two refined leaves along y share one.
 Coord plainOrigin(const Coord& refined) {
   return {refined.x(), (refined.y() >> 4) * leaf_layers, refined.z()};
 }
 
-/// What tiles of the refined lattice are inside, on the plain one.
+/// The inside tiles of the refined lattice, on the plain one.
 struct PlainTiles {
   std::vector<CoordBBox> whole;
-  std::vector<Coord> leaves;  ///< origins of those of which one half alone is known to be inside
+  std::vector<Coord> leaves;  ///< origins of leaves of which only one half is known to be inside
 };
 
 PlainTiles plainTiles(const FloatTree& refined, ZRange core) {

@@ -30,8 +30,8 @@ namespace {
 
 using NormalAccessor = openvdb::tree::ValueAccessor<const Vec3STree, false>;
 
-/// Eq. (5), or the facet's own. Zero, without a look at the mask, where no threshold could overturn
-/// a voxel at the distance `d_mm`.
+/// Returns f by eq. (5), or by the facet's own rule. Returns zero, without reading the mask, if no
+/// threshold can change a voxel at the distance `d_mm`.
 float displacement(const ShapeDither& dither, const Vec3s& normal, const Coord& ijk,
                    float d_mm = 0) {
   const double half_diameter = halfVoxelDiameter(normal, dither.pitch_mm);
@@ -45,8 +45,8 @@ float displacement(const ShapeDither& dither, const Vec3s& normal, const Coord& 
   return static_cast<float>(half_diameter * (double{facet.checker} * half_step + random));
 }
 
-/// The normals of the voxels of one leaf at a time: those given, or the gradient's, made row by row
-/// when they are asked for.
+/// The normals of one leaf's voxels: those given, or those of the gradient, computed row by row on
+/// demand.
 class VoxelNormals {
  public:
   VoxelNormals(const ShapeDither& dither, const FloatTree& surface, const Vec3STree* given,
@@ -55,7 +55,7 @@ class VoxelNormals {
     if (given) given_.emplace(*given);
   }
 
-  /// Turns to the `wanted` voxels of `leaf`.
+  /// Prepares for the `wanted` voxels of `leaf`.
   void visit(const FloatLeaf& leaf, const LeafBits& wanted) {
     leaf_ = &leaf;
     wanted_ = wanted;
@@ -63,21 +63,22 @@ class VoxelNormals {
     rows_made_ = 0;
   }
 
-  /// The leaf's distances and those around it.
+  /// The distances in the leaf and around it.
   const LeafSurroundings& around() {
     if (!visited_) gradient_.visit(*leaf_, wanted_);
     visited_ = true;
     return gradient_.around();
   }
 
-  /// Of the active voxel at `offset`.
+  /// Returns the normal of the active voxel at `offset`.
   Vec3s operator()(unsigned offset) {
     if (given_) return given_->getValue(leaf_->offsetToGlobalCoord(offset));
     makeRow(offset / 8);
     return {normals_[0][offset], normals_[1][offset], normals_[2][offset]};
   }
 
-  /// Of `undecided`, at least the voxels within `reach`·k_D of the surface along their normal.
+  /// Returns those of `undecided` that are within `reach`·k_D of the surface along their normal,
+  /// and perhaps others.
   LeafBits within(const LeafBits& undecided, double reach) {
     if (given_) return undecided;
     LeafBits near = no_bits;
@@ -121,11 +122,12 @@ class VoxelNormals {
   const FloatLeaf* leaf_ = nullptr;
   LeafBits wanted_{};
   bool visited_ = false;
-  std::uint64_t rows_made_ = 0;  ///< a bit for each row along z, in the order of the leaf
+  std::uint64_t rows_made_ = 0;  ///< one bit per row along z, in the order of the leaf
   std::array<std::array<float, 512>, 3> normals_{};
 };
 
-/// f on ∂V: active at its voxels. A leaf's transient data holds the bits of its greatest |f|.
+/// Returns f on ∂V, active at its voxels. A leaf's transient data holds the bits of its maximum
+/// |f|.
 FloatTree surfaceDisplacements(const ShapeDither& dither, const FloatTree& surface,
                                const Vec3STree* normals, ZRange layers, ZRange valid) {
   FloatTree displacements(0.0F);
@@ -139,38 +141,38 @@ FloatTree surfaceDisplacements(const ShapeDither& dither, const FloatTree& surfa
 
       if (!given) gradient.visit(leaf, bits);
       auto made = std::make_unique<FloatLeaf>(leaf.origin(), 0.0F);
-      float greatest = 0;
+      float maximum = 0;
       forEachBit(bits, [&](unsigned offset) {
         const Coord ijk = leaf.offsetToGlobalCoord(offset);
         const Vec3s normal = given                    ? given->getValue(ijk)
                              : leaf.isValueOn(offset) ? gradient.normal(offset)
                                                       : Vec3s(0.0F);
         const float f = displacement(dither, normal, ijk);
-        greatest = std::max(greatest, std::abs(f));
+        maximum = std::max(maximum, std::abs(f));
         made->setValueOn(offset, f);
       });
-      made->setTransientData(std::bit_cast<std::uint32_t>(greatest));
+      made->setTransientData(std::bit_cast<std::uint32_t>(maximum));
       return made;
     };
   });
   return displacements;
 }
 
-/// What stands between a voxel's d and its f, one leaf at a time: `visit` returns a bound of |f| in
-/// the leaf, `operator()` f at an active voxel. `overturnable` are those of the undecided voxels
-/// whose f has to be known to tell its sign from d's.
+/// Computes f one leaf at a time, by where it is read: `visit` returns a bound of |f| in the leaf,
+/// and `operator()` returns f at an active voxel. `overturnable` returns the undecided voxels whose
+/// sign f may change.
 class AtClosest {
  public:
   AtClosest(const FloatTree& displacements, const SearchDisk& disk)
       : closest_(displacements, disk) {}
 
   float visit(const FloatLeaf& leaf) {
-    float greatest = 0;
-    if (!closest_.visit(leaf.origin())) return greatest;
+    float maximum = 0;
+    if (!closest_.visit(leaf.origin())) return maximum;
     for (const FloatLeaf* near : closest_.leaves()) {
-      if (near) greatest = std::max(greatest, std::bit_cast<float>(near->transientData()));
+      if (near) maximum = std::max(maximum, std::bit_cast<float>(near->transientData()));
     }
-    return greatest;
+    return maximum;
   }
 
   static LeafBits overturnable(const LeafBits& undecided) { return undecided; }
@@ -189,7 +191,7 @@ class AtFoot {
   AtFoot(const ShapeDither& dither, const Vec3STree& normals)
       : dither_(dither), normals_(normals) {}
 
-  /// F, and a little for the rounding of normals and f.
+  /// F, plus a margin for the rounding of normals and f.
   float visit(const FloatLeaf& leaf) {
     leaf_ = &leaf;
     return static_cast<float>(dither_.largestDisplacementMm() * (1 + 1e-6));
@@ -258,7 +260,8 @@ ShapeDither::Layers ShapeDither::reach(bool normals_given) const {
   if (at == DitherAt::closest) layers.normals = SearchDisk(pitch_mm, searchRadiusMm()).halo().z();
   if (at == DitherAt::foot)
     layers.normals = static_cast<int>(std::ceil(largestDisplacementMm() / pitch_mm.z() + 0.5));
-  // One more for the neighbours: those that make a surface voxel, and those of the gradient.
+  // One more for the neighbours that decide whether a voxel is a surface voxel, and for the
+  // gradient.
   if (at == DitherAt::closest || !normals_given) layers.surface = layers.normals + 1;
   if (guarded) layers.surface = std::max(layers.surface, WallGuard::reachLayers(amplitude));
   return layers;

@@ -1,5 +1,8 @@
 #pragma once
 
+// The dither family: kernels that turn distances and thresholds into printed voxels, by shape
+// dithering or by interlacing.
+
 #include <memory>
 
 #include <openvdb/openvdb.h>
@@ -10,10 +13,10 @@
 
 namespace vdbdither {
 
-/// An empty grid `displaced`: like `surface` in all but its name.
+/// Returns an empty grid `displaced`, otherwise like `surface`.
 openvdb::FloatGrid::Ptr makeDisplacedGrid(const openvdb::FloatGrid& surface);
 
-/// Where the threshold M and the voxel's diameter k_D are read for a voxel v.
+/// The place at which the threshold M and the half diameter k_D are read for a voxel v.
 enum class DitherAt {
   closest,  ///< at v̄, the closest surface voxel: eqs. (3)–(6)
   foot,     ///< at the voxel that contains the foot point c(v) − d(v)·n(v)
@@ -27,45 +30,46 @@ struct ShapeDither {
   double amplitude = 4;  ///< the constant of eq. (5)
   DitherAt at = DitherAt::closest;
   ThresholdMask mask = ThresholdMask::constant(0.5F);
-  /// In place of `amplitude`, which then is 2, the constant that no facet exceeds; null: the same
-  /// for all.
+  /// The constant by facet, if not null. It never exceeds 2, which `amplitude` must then be.
   std::shared_ptr<const AdaptedAmplitude> adapted = nullptr;
-  bool guarded = false;  ///< spares thin walls and gaps: see WallGuard
+  bool guarded = false;  ///< keeps thin walls and gaps; see WallGuard
 
-  /// F: no |f| is greater. Half an amplitude of the largest k_D, which is half a voxel's diagonal.
+  /// F, the maximum |f|: half the amplitude times the largest k_D, which is half a voxel's
+  /// diagonal.
   [[nodiscard]] double largestDisplacementMm() const { return amplitude * pitch_mm.length() / 4; }
 
-  /// How far v̄ is looked for: F plus one voxel diagonal. Where part and gap are at least a diagonal
-  /// thick, the ball of half a diagonal that touches the surface from either side holds a voxel
-  /// centre; one of the two balls lies beyond the surface seen from v, within |d| + a diagonal, and
-  /// on a staircase of face neighbours from v to that centre the set V begins or ends with a
-  /// surface voxel no farther away. Thinner cracks and plates may have none: f is 0 there.
+  /// The radius of the search for v̄: F plus one voxel diagonal. Where part and gap are at least a
+  /// diagonal thick, each of the two balls with the diagonal as their diameter that touch the
+  /// surface from either side holds a voxel centre. One of the balls lies beyond the surface as
+  /// seen from v, within |d| plus a diagonal. On a staircase of face neighbours from v to its voxel
+  /// centre the set V begins or ends with a surface voxel, which is no farther away. Thinner cracks
+  /// and plates may have none; f is 0 there.
   [[nodiscard]] double searchRadiusMm() const {
     return largestDisplacementMm() + pitch_mm.length();
   }
 
-  /// Layers around a voxel that decide about it.
+  /// The layers around a voxel on which its state depends.
   struct Layers {
     int surface = 0;
-    int normals = 0;  ///< 0 where none are given: they come from the surface
+    int normals = 0;  ///< 0 if none are given: they are computed from the surface
   };
   [[nodiscard]] Layers reach(bool normals_given) const;
 
   struct Result {
     openvdb::BoolGrid::Ptr solid;       ///< V′
-    openvdb::FloatGrid::Ptr displaced;  ///< d′, if asked for: d + f at active voxels, d at others
+    openvdb::FloatGrid::Ptr displaced;  ///< d′, if requested: d + f at active voxels, d at others
   };
 
-  /// The printed voxels of `core`.
+  /// Returns the printed voxels of `core`.
   ///
-  /// f is computed in double precision from single-precision normals and thresholds and rounded to
-  /// single once; then d + f < 0 decides, exactly. Inactive voxels and tiles are decided by the
-  /// sign of d. A voxel whose v̄ is not found, where there is no normal, or that f would overturn
-  /// against the guard has f = 0.
+  /// f is computed in double precision from single-precision normals and thresholds and rounded
+  /// once to single precision; then the test d + f < 0 is exact. Inactive voxels and tiles are
+  /// decided by the sign of d. f is 0 for a voxel whose v̄ is not found, that has no normal, or
+  /// that the guard does not allow to change.
   ///
   /// \param surface  d in mm; its band must hold F
-  /// \param normals  `N`, or null: the gradient's
-  /// \param valid    the layers that may be read; those beyond count as outside V and inactive
+  /// \param normals  the grid `N`, or null to use the gradient
+  /// \param valid  the layers that can be read; others count as outside V and inactive
   [[nodiscard]] Result run(const openvdb::FloatGrid& surface, const openvdb::Vec3SGrid* normals,
                            ZRange core, ZRange valid, bool with_displaced) const;
 };

@@ -7,16 +7,16 @@
 
 namespace vdbdither {
 
-/// k_D(n) = 1 / (2·‖D n‖∞): the distance in mm from a voxel's centre to its boundary along the unit
-/// normal `n`, half the voxel's diameter that way. Zero for the zero vector. (Morsy, Brunton, Urban
-/// 2022, eq. 6.)
+/// Returns k_D(n) = 1 / (2·‖D n‖∞), the distance in mm from a voxel's centre to its boundary along
+/// the unit normal `n`: half the voxel's diameter in this direction (Morsy, Brunton, Urban 2022,
+/// eq. 6). Zero for the zero vector.
 inline double halfVoxelDiameter(const openvdb::Vec3s& n, const openvdb::Vec3d& pitch_mm) {
   const double steepest = std::max(
       {std::abs(n[0]) / pitch_mm[0], std::abs(n[1]) / pitch_mm[1], std::abs(n[2]) / pitch_mm[2]});
   return steepest > 0.0 ? 0.5 / steepest : 0.0;
 }
 
-/// The largest k_D of any direction: half the voxel's diagonal.
+/// Returns the largest k_D of any direction: half the voxel's diagonal.
 inline double largestHalfVoxelDiameter(const openvdb::Vec3d& pitch_mm) {
   return 0.5 * pitch_mm.length();
 }

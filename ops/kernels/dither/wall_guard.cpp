@@ -11,8 +11,9 @@ using openvdb::Coord;
 
 namespace {
 
-/// A surface that bends more is not one sheet to a voxel: its edges and wires stay as they are.
-constexpr double least_radius_mm = 0.3;
+/// A surface of a smaller radius does not count as a single sheet; its edges and wires do not
+/// change.
+constexpr double minimum_radius_mm = 0.3;
 
 }  // namespace
 
@@ -31,7 +32,7 @@ bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsi
   Coord outward(0);
   double rise_all_mm = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    // What a flat facet's normal has of rounding errors is no direction.
+    // Ignores components that are rounding errors of a flat facet's normal.
     if (rise_mm[axis] < 1e-3 * highest_mm) continue;
     outward[axis] = normal[axis] > 0 ? 1 : -1;
     rise_all_mm += rise_mm[axis];
@@ -42,7 +43,7 @@ bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsi
   const int own = d_mm < 0 ? -1 : 1;  // the side that the voxel lies on
   using At = LeafSurroundings;
   const float* here = around.at(offset);
-  // How far a voxel is from the surface, on the given side of it.
+  // The distance of a voxel from the surface, positive on the given side.
   const auto sample = [&](int side, const Coord& step) {
     const int farthest = std::max({std::abs(step.x()), std::abs(step.y()), std::abs(step.z())});
     const double d =
@@ -52,8 +53,8 @@ bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsi
     return std::clamp(side * d, -band_mm, band_mm);
   };
 
-  // T on its own side, one step further in, then across the face, as many steps as it takes to tell
-  // thick from thin.
+  // T on the voxel's own side, one step further in; then across the face, by the steps that are
+  // needed to tell thick from thin.
   const int steps = 1 + static_cast<int>(1.5 * depth_mm / rise_all_mm + 0.95);
   const auto outward_by = [&](int n) {
     return Coord(n * outward.x(), n * outward.y(), n * outward.z());
@@ -70,7 +71,7 @@ bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsi
         const openvdb::Vec3d to(pitch_mm_[0] * i, pitch_mm_[1] * j, pitch_mm_[2] * k);
         const double rise = openvdb::Vec3d(normal).dot(to);
         const double flat_mm = std::clamp(depth_mm + own * rise, -band_mm, band_mm);
-        const double bend_mm = (to.lengthSqr() - rise * rise) / (2 * least_radius_mm);
+        const double bend_mm = (to.lengthSqr() - rise * rise) / (2 * minimum_radius_mm);
         const double there_mm = sample(own, {i, j, k});
         if (std::min(flat_mm, there_mm) < half_diameter_mm &&
             std::abs(flat_mm - there_mm) > bend_mm + 0.02 * rise_all_mm)

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int word_bits = 64;
 
-/// What the voxels of a tile and of a leaf count as.
+/// Reads tiles and leaves of a grid of bits: active and true voxels count.
 struct TrueVoxels {
   using Tree = openvdb::BoolTree;
 
@@ -40,7 +40,7 @@ struct ScalarVoxels {
   }
   [[nodiscard]] LeafBits leaf(const FloatLeaf& leaf) const {
     const float* values = leaf.buffer().data();
-    // Above is not below what comes next after the level.
+    // Values above the level are not below the next float after it.
     const bool above = inside == Inside::above;
     const float limit =
         above ? std::nextafter(level, std::numeric_limits<float>::infinity()) : level;
@@ -63,7 +63,7 @@ constexpr std::uint64_t transposed(std::uint64_t m) {
   return m ^ t ^ (t << 28);
 }
 
-/// The eight rows along x that a leaf has at one y: byte z.
+/// The eight rows along x of a leaf at one y: byte z holds the row at z.
 std::uint64_t rowsAlongX(const LeafBits& bits, unsigned y) {
   std::uint64_t matrix = 0;
   for (unsigned x = 0; x < bits.size(); ++x) matrix |= (bits[x] >> (8 * y) & 0xFF) << (8 * x);
@@ -82,7 +82,7 @@ std::vector<BitLayer> layersOf(const openvdb::Grid<typename Voxels::Tree>& grid,
   const int first_leaf_y = box.min().y() & ~(leaf_layers - 1);
   const int last_leaf_y = box.max().y() & ~(leaf_layers - 1);
   const ZRange aligned = alignedToLeaves(layers);
-  // Leaves of one y make whole rows, so that no two threads meet in a word.
+  // Leaves at one y fill whole rows, so that no two threads write to the same word.
   tbb::parallel_for(0, (last_leaf_y - first_leaf_y) / leaf_layers + 1, [&](int strip) {
     const auto accessor = grid.getConstAccessor();
     const int y = first_leaf_y + strip * leaf_layers;
@@ -114,7 +114,7 @@ std::vector<BitLayer> layersOf(const openvdb::Grid<typename Voxels::Tree>& grid,
           set(byte, static_cast<unsigned>(at - y), ~std::uint64_t{0});
       }
     }
-    // What lies in the same words and beyond the box.
+    // Clears the bits of these words that lie beyond the box.
     for (int at = std::max(y, box.min().y()); at < y_end; ++at) {
       const std::size_t begin = frame.row(at - frame.yBegin());
       for (BitLayer& layer : made) {

@@ -10,12 +10,12 @@
 
 namespace vdbdither {
 
-/// Which voxels of a layer belong to a set, one bit each: row after row, `BitFrame::words` words to
-/// a row, x rising from the lowest bit of the first word.
+/// The voxels of a layer that belong to a set, one bit each: row after row, `BitFrame::words` words
+/// per row, x rising from the lowest bit of the first word.
 using BitLayer = std::vector<std::uint64_t>;
 
-/// Where the voxels of a box lie in bit layers. At least one voxel around the box, in x and in y,
-/// has a bit too, which is never set.
+/// The layout of a box of voxels in bit layers. On each side of the box, in x and in y, at least
+/// one more voxel has a bit, which is never set.
 class BitFrame {
  public:
   explicit BitFrame(const openvdb::CoordBBox& box);
@@ -23,13 +23,13 @@ class BitFrame {
   [[nodiscard]] const openvdb::CoordBBox& box() const { return box_; }
   [[nodiscard]] int words() const { return words_; }
   [[nodiscard]] int rows() const { return rows_; }
-  [[nodiscard]] int xBegin() const { return x_begin_; }  ///< of bit 0; a multiple of 8
+  [[nodiscard]] int xBegin() const { return x_begin_; }  ///< of bit 0, a multiple of 8
   [[nodiscard]] int yBegin() const { return y_begin_; }  ///< of row 0
 
   [[nodiscard]] BitLayer emptyLayer() const {
     return BitLayer(static_cast<std::size_t>(words_) * static_cast<std::size_t>(rows_), 0);
   }
-  /// Where a row begins in a layer.
+  /// The index of a row's first word in a layer.
   [[nodiscard]] std::size_t row(int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(words_);
   }
@@ -42,15 +42,16 @@ class BitFrame {
   int y_begin_;
 };
 
-/// What of a scalar grid counts as inside: values below the level (distances) or above it
-/// (occupancies).
+/// The values of a scalar grid that count as inside: those below the level (for distances) or above
+/// it (for occupancies).
 enum class Inside { below, above };
 
-/// One bit layer for each of `layers`: the voxels of the frame's box that are active and true.
+/// Returns one bit layer for each of `layers`: the voxels of the frame's box that are active and
+/// true.
 std::vector<BitLayer> bitLayers(const openvdb::BoolGrid& grid, const BitFrame& frame,
                                 ZRange layers);
 
-/// The same for the voxels, active or not, whose value is less or greater than `level`.
+/// The same for the voxels, active or not, whose values are below or above `level`.
 std::vector<BitLayer> bitLayers(const openvdb::FloatGrid& grid, const BitFrame& frame,
                                 ZRange layers, Inside inside, float level);
 

@@ -6,20 +6,21 @@
 
 namespace vdbdither {
 
-/// Metadata of a grid of distances: every voxel nearer to the surface than so many mm is active.
-/// The background may be more, where the band follows the voxels' diameters.
+/// The metadata key of a grid of distances: every voxel nearer to the surface than this many mm is
+/// active. The background can be larger, where the band depends on the voxels' diameters.
 inline constexpr const char* held_band_key = "vdbdither:band_mm";
 
 inline void setHeldBandMm(openvdb::GridBase& surface, double band_mm) {
   surface.insertMeta(held_band_key, openvdb::DoubleMetadata(band_mm));
 }
 
-/// Whether the grid has that metadata: those of other tools have not.
+/// Whether the grid has this metadata; grids of other tools do not.
 inline bool statesHeldBand(const openvdb::GridBase& surface) {
   return surface.getMetadata<openvdb::DoubleMetadata>(held_band_key) != nullptr;
 }
 
-/// What the metadata says, or the background, which is what other tools hold.
+/// Returns the value of the metadata, or without it the background, which is the band of other
+/// tools.
 inline double heldBandMm(const openvdb::FloatGrid& surface) {
   const auto stated = surface.getMetadata<openvdb::DoubleMetadata>(held_band_key);
   return stated ? stated->value() : double{surface.background()};

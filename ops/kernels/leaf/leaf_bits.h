@@ -1,5 +1,8 @@
 #pragma once
 
+// The leaf family: kernels on single OpenVDB leaves, their bits and their neighbourhoods, and on
+// whole trees made of leaves.
+
 #ifdef __SSE2__
 #include <emmintrin.h>
 #endif
@@ -31,19 +34,19 @@ inline constexpr LeafBits no_bits{};
 /// A word whose rows along z are all `row`.
 constexpr std::uint64_t everyRow(std::uint8_t row) { return 0x0101010101010101U * row; }
 
-/// `core` and so many layers around it, cut at `valid`.
+/// `core` and `layers` more on each side, limited to `valid`.
 inline ZRange grownWithin(ZRange core, int layers, ZRange valid) {
   return intersection({core.begin - layers, core.end + layers}, valid);
 }
 
-/// The rows of a leaf whose lowest layer is `leaf_z`, cut to the layers that `layers` holds.
+/// The bits of a row along z that lie in `layers`, for a leaf whose lowest layer is `leaf_z`.
 inline std::uint8_t rowWithin(int leaf_z, ZRange layers) {
   const int begin = std::clamp(layers.begin - leaf_z, 0, leaf_layers);
   const int end = std::clamp(layers.end - leaf_z, begin, leaf_layers);
   return static_cast<std::uint8_t>((1U << end) - (1U << begin));
 }
 
-/// The bits of eight values on end, a row along z, that are less than `limit`.
+/// The bits of the values below `limit`, of eight consecutive ones: a row along z.
 inline std::uint8_t rowBelow(const float* values, float limit) {
 #ifdef __SSE2__
   const __m128 limits = _mm_set1_ps(limit);
@@ -57,7 +60,7 @@ inline std::uint8_t rowBelow(const float* values, float limit) {
 #endif
 }
 
-/// The same for eight rows on end.
+/// The same for eight consecutive rows.
 inline std::uint64_t wordBelow(const float* values, float limit) {
   std::uint64_t word = 0;
   for (unsigned y = 0; y < 8; ++y)
@@ -65,8 +68,8 @@ inline std::uint64_t wordBelow(const float* values, float limit) {
   return word;
 }
 
-/// V, the plain voxelization: the voxels with d < 0, active or not, of the rows that `row` lets
-/// through.
+/// V, the plain voxelization: the voxels with d < 0, active or not, at the places in their rows
+/// that `row` selects.
 inline LeafBits insideBits(const FloatLeaf& leaf, std::uint8_t row) {
   const float* values = leaf.buffer().data();
   LeafBits bits;
@@ -74,7 +77,7 @@ inline LeafBits insideBits(const FloatLeaf& leaf, std::uint8_t row) {
   return bits;
 }
 
-/// The active voxels of the rows that `row` lets through.
+/// The active voxels, at the places in their rows that `row` selects.
 inline LeafBits activeBits(const FloatLeaf& leaf, std::uint8_t row) {
   LeafBits bits;
   for (unsigned x = 0; x < 8; ++x)
@@ -82,7 +85,7 @@ inline LeafBits activeBits(const FloatLeaf& leaf, std::uint8_t row) {
   return bits;
 }
 
-/// The active voxels with |d| ≤ `bound`, of the rows that `row` lets through.
+/// The active voxels with |d| ≤ `bound`, at the places in their rows that `row` selects.
 inline LeafBits bandBits(const FloatLeaf& leaf, float bound, std::uint8_t row) {
   const float* values = leaf.buffer().data();
   const float beyond = std::nextafter(bound, std::numeric_limits<float>::infinity());
@@ -103,7 +106,7 @@ void forEachBit(const LeafBits& bits, Visit visit) {
   }
 }
 
-/// The leaves of `tree` that hold some of `layers`, in the order of the tree.
+/// Returns the leaves of `tree` that meet `layers`, in the order of the tree.
 inline std::vector<const FloatLeaf*> leavesIn(const openvdb::FloatTree& tree, ZRange layers) {
   std::vector<const FloatLeaf*> leaves;
   tree.getNodes(leaves);
@@ -112,9 +115,9 @@ inline std::vector<const FloatLeaf*> leavesIn(const openvdb::FloatTree& tree, ZR
   return leaves;
 }
 
-/// Makes leaves in parallel and hangs them into `tree`. `make_worker()` returns what one thread
-/// works with: a function from a leaf of `sources` to a std::unique_ptr of the new leaf, null for
-/// none.
+/// Makes leaves in parallel and adds them to `tree`. `make_worker()` is called once for each range
+/// of sources and returns a function from a leaf of `sources` to a std::unique_ptr of the new leaf,
+/// or null for none.
 template <typename Tree, typename MakeWorker>
 void addLeaves(Tree& tree, std::span<const FloatLeaf* const> sources,
                const MakeWorker& make_worker) {

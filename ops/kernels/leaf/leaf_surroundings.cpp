@@ -17,7 +17,7 @@ namespace {
 
 using Lanes = std::array<std::uint32_t, 4>;
 
-/// All ones where a bit is set.
+/// By four bits: lanes of all ones where the bit is set.
 constexpr std::array<Lanes, 16> lanes_by_bits = [] {
   std::array<Lanes, 16> lanes{};
   for (unsigned bits = 0; bits < lanes.size(); ++bits) {
@@ -26,7 +26,7 @@ constexpr std::array<Lanes, 16> lanes_by_bits = [] {
   return lanes;
 }();
 
-/// Four values, those without a bit as the infinity of their sign.
+/// Copies four values; those whose bit is not set become the infinity of their sign.
 inline void copyFour(float* out, const float* in, unsigned bits) {
 #ifdef __SSE2__
   const __m128 held = _mm_loadu_ps(reinterpret_cast<const float*>(lanes_by_bits[bits].data()));
@@ -43,12 +43,12 @@ inline void copyFour(float* out, const float* in, unsigned bits) {
 
 }  // namespace
 
-/// What a leaf's place in the tree holds: the values and states of its voxels in its own order.
+/// The values and states of the voxels of a leaf, or of a tile in its place, in the leaf's order.
 struct LeafSurroundings::Block {
   const float* values;
   const openvdb::util::NodeMask<3>* active;
 
-  /// Half a row: `z` is 0 or 4.
+  /// Copies half a row: `z` is 0 or 4.
   void copyHalf(float* out, int x, int y, int z) const {
     const std::uint64_t word = active->getWord<std::uint64_t>(static_cast<openvdb::Index>(x));
     copyFour(out, values + 64 * x + 8 * y + z, static_cast<unsigned>(word >> (8 * y + z)) & 0xfU);
@@ -118,7 +118,7 @@ void LeafSurroundings::visit(const FloatLeaf& leaf, const LeafBits& wanted) {
       }
     }
   }
-  // Where the valid layers begin or end within the leaves.
+  // The layers of these leaves that are not valid.
   for (int z = -halo; z < 8 + halo; ++z) {
     if (valid_.contains(origin.z() + z)) continue;
     for (int x = span_x.begin; x < span_x.end; ++x) {

@@ -10,11 +10,10 @@
 
 namespace vdbdither {
 
-/// The distances of the voxels of one leaf at a time and of the two voxels all around it, side by
-/// side in memory.
+/// The distances of the voxels of one leaf and of the two voxels around it on all sides, in one
+/// block of memory.
 ///
-/// A voxel that is inactive has no distance but lies on one side: it holds +∞ outside the part and
-/// −∞ inside.
+/// Of an inactive voxel only the side is known: it holds +∞ outside the part and −∞ inside.
 class LeafSurroundings {
  public:
   static constexpr int halo = 2;
@@ -26,12 +25,13 @@ class LeafSurroundings {
   LeafSurroundings(const openvdb::FloatTree& surface, ZRange valid)
       : surface_(surface), valid_(valid) {}
 
-  /// Turns to voxels of `leaf`, a leaf of `surface`. Only of the rows along z that hold one of
-  /// `wanted`, and of those around them, is anything known then.
+  /// Reads the surroundings of `leaf`, a leaf of `surface`. Only the rows along z that hold one of
+  /// `wanted`, and the rows around them, are filled.
   void visit(const FloatLeaf& leaf, const LeafBits& wanted);
 
-  /// Where the distance of the voxel at `offset` in the leaf is, one of a wanted row; its
-  /// neighbours', up to `halo` away along each axis, are at multiples of the strides.
+  /// Returns where the distance of the voxel at `offset` in the leaf lies, which must be in a
+  /// wanted row. Those of its neighbours, up to `halo` away along each axis, lie at multiples of
+  /// the strides.
   [[nodiscard]] const float* at(unsigned offset) const {
     const auto n = static_cast<int>(offset);
     return &values_[static_cast<std::size_t>(indexOf(n / 64, n / 8 % 8, n % 8))];
@@ -48,7 +48,7 @@ class LeafSurroundings {
   alignas(64) std::array<float, static_cast<std::size_t>(stride_x) * (8 + 2 * halo)> values_{};
   openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> surface_;
   ZRange valid_;
-  std::deque<std::array<float, 512>> tiles_;  ///< active tiles around the leaf, written out
+  std::deque<std::array<float, 512>> tiles_;  ///< active tiles around the leaf, expanded
 };
 
 }  // namespace vdbdither

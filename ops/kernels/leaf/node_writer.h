@@ -18,14 +18,14 @@ typename Tree::LeafNodeType* newLeaf(const openvdb::Coord& origin,
   return leaf;
 }
 
-/// Leaves beside each other along x, from the one at `origin` on.
+/// Adjacent leaves along x, the first at `origin`.
 struct LeafRun {
   openvdb::Coord origin;
   int leaves;
 };
 
-/// Hangs leaves and tiles into the nodes above leaves, which must be there. Several threads may do
-/// so at once in different nodes.
+/// Adds leaves and tiles to the nodes above the leaves, which must exist. Several threads can write
+/// at once to different nodes.
 template <class Tree>
 class NodeWriter {
  public:
@@ -35,7 +35,7 @@ class NodeWriter {
     return xyz & ~(static_cast<int>(Parent::DIM) - 1);
   }
 
-  /// Makes the node above the leaf at `origin`.
+  /// Makes the node above the leaf at `origin`, if there is none.
   static void makeParent(Tree& tree, const openvdb::Coord& origin) {
     if (!tree.template probeConstNode<Parent>(origin))
       tree.addTile(1, origin, tree.background(), false);

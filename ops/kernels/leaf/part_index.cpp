@@ -20,7 +20,7 @@ namespace {
 using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree>;
 using Leaf = Int32Tree::LeafNodeType;
 
-/// Tiles of what is inside a part alone; a later call yields to what an earlier one left.
+/// Fills the tiles inside a part, except where an earlier call has filled.
 void fillInterior(const FloatGrid& surface, int part, Int32Tree& parts) {
   for (auto tile = surface.tree().cbeginValueOff(); tile; ++tile) {
     if (tile.isVoxelValue() || !(*tile < 0)) continue;
@@ -42,12 +42,12 @@ void fillLeaf(Leaf& leaf, std::vector<Accessor>& surfaces) {
   for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
     const Coord ijk = leaf.offsetToGlobalCoord(n);
     int nearest = 0;
-    float least = std::numeric_limits<float>::infinity();
-    for (std::size_t part = 0; part < surfaces.size() && !(least < 0); ++part) {
+    float minimum = std::numeric_limits<float>::infinity();
+    for (std::size_t part = 0; part < surfaces.size() && !(minimum < 0); ++part) {
       float distance = 0;
       const bool active = surfaces[part].probeValue(ijk, distance);
-      if ((active || distance < 0) && distance < least) {
-        least = distance;
+      if ((active || distance < 0) && distance < minimum) {
+        minimum = distance;
         nearest = static_cast<int>(part) + 1;
       }
     }

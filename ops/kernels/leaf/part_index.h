@@ -7,11 +7,10 @@
 
 namespace vdbdither {
 
-/// Which part a voxel belongs to, from 1: the first of `surfaces` that holds it (d < 0, tiles and
-/// inactive voxels too), or where none does but some are near, the nearest. 0 elsewhere.
-///
-/// \param surfaces  d in mm of each part, all on one lattice; active within their bands
-/// How many parts there are goes with the grid, as its metadata.
+/// Returns the part that each voxel belongs to, counted from 1: the first of `surfaces` that holds
+/// it (d < 0, tiles and inactive voxels too), or where none does but some are near, the nearest.
+/// Other voxels are 0. The number of parts is stored in the grid's metadata.
+/// \param surfaces  distances of each part in mm, all on one lattice, active within their bands
 openvdb::Int32Grid::Ptr partIndex(std::span<const openvdb::FloatGrid::ConstPtr> surfaces);
 
 }  // namespace vdbdither

@@ -13,8 +13,8 @@ using openvdb::CoordBBox;
 
 namespace {
 
-/// Appends the inside tiles in the tables of all nodes of one kind: only those that hold some of
-/// `layers`, not the whole table, and as one box those that stand on each other.
+/// Appends the inside tiles in the tables of all nodes of one kind. Looks only at entries that meet
+/// `layers`, and joins tiles on top of each other to one box.
 template <typename Node>
 void addInsideTiles(const openvdb::FloatTree& surface, ZRange layers,
                     std::vector<CoordBBox>& boxes) {

@@ -16,15 +16,15 @@ struct SolidLeaf {
   LeafBits inside;
 };
 
-/// The tiles of `surface` that lie inside (d < 0), cut to `layers`; those that stand on each other
-/// are one box.
+/// Returns the tiles of `surface` that lie inside (d < 0), cut to `layers`; tiles on top of each
+/// other become one box.
 std::vector<openvdb::CoordBBox> insideTiles(const openvdb::FloatTree& surface, ZRange layers);
 
-/// An empty grid `solid`: active and true inside, false outside.
+/// Returns an empty grid `solid`, in which voxels inside the part are active and true.
 openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform);
 
-/// The grid `solid` of boxes filled whole and of leaves, which replace what the boxes filled there.
-/// Canonical: its topology is as coarse as its values allow, whatever the topology it came from.
+/// Returns the grid `solid` of boxes, which are filled whole, and of leaves, which replace what the
+/// boxes filled. The tree is canonical: its topology depends on the voxels alone.
 openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform,
                                      std::span<const SolidLeaf> leaves,
                                      std::span<const openvdb::CoordBBox> boxes);

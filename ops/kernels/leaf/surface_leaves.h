@@ -12,28 +12,27 @@
 
 namespace vdbdither {
 
-/// The distances of a leaf's voxels while they change, in its order. Those of inactive voxels tell
-/// the sign alone.
+/// The distances of a leaf's voxels while they are changed, in the leaf's order. Of inactive voxels
+/// only the sign counts.
 struct LeafValues {
   std::array<float, 512> distance;
   LeafBits active{};
 
-  /// Those of `surface` at `origin`, be it a leaf or a tile there.
+  /// The values of `surface` at `origin`, whether there is a leaf or a tile.
   static LeafValues of(const openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>& surface,
                        const openvdb::Coord& origin);
 };
 
-/// A level set of `prototype`'s name, transform and metadata made of leaves, each over `core`
-/// alone: voxels are active where they are so in `leaves` and nearer than `background_mm`, and hold
-/// ±background elsewhere; `inside` is filled first. Canonical.
-///
-/// \param leaves  by their origins
+/// Returns a level set made of `inside`, which is filled first, and of leaves at `origins`, limited
+/// to the layers of `core`. Voxels are active where they are active in `leaves` and nearer than
+/// `background_mm`, and hold ±background elsewhere. Name, transform and metadata are those of
+/// `prototype`. The tree is canonical.
 openvdb::FloatGrid::Ptr surfaceOf(const openvdb::FloatGrid& prototype, float background_mm,
                                   ZRange core, std::span<const openvdb::Coord> origins,
                                   std::span<const LeafValues> leaves,
                                   std::span<const openvdb::CoordBBox> inside);
 
-/// An empty grid like `surface` with another background, which all of its band holds.
+/// Returns an empty grid like `surface` with another background, which is also its held band.
 openvdb::FloatGrid::Ptr emptySurface(const openvdb::FloatGrid& surface, float background_mm);
 
 }  // namespace vdbdither

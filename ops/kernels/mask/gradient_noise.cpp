@@ -1,3 +1,5 @@
+// Perlin: "Improving Noise", SIGGRAPH 2002.
+
 #include "ops/kernels/mask/gradient_noise.h"
 
 #include <algorithm>
@@ -13,7 +15,7 @@ namespace {
 
 using openvdb::Coord;
 
-/// From the centre of a cube to the middles of its edges.
+/// The directions from the centre of a cube to the middles of its edges.
 constexpr std::array<std::array<int, 3>, 12> gradients{{{1, 1, 0},
                                                         {-1, 1, 0},
                                                         {1, -1, 0},
@@ -39,7 +41,7 @@ double fade(double t) { return t * t * t * (t * (6 * t - 15) + 10); }
 std::vector<std::uint32_t> gradientNoiseRanks(const Coord& size, int cell, std::uint64_t seed) {
   const Coord cells(size.x() / cell, size.y() / cell, size.z() / cell);
   const auto corners = static_cast<std::uint32_t>(cells.x() * cells.y() * cells.z());
-  // Its own seed: the order among equals must not follow the gradients.
+  // Another seed than that of the order among equals, which must not depend on the gradients.
   const std::vector<std::uint32_t> directions = randomPermutation(corners, ~seed);
   std::vector<double> values;
   for (int z = 0; z < size.z(); ++z) {
@@ -53,7 +55,7 @@ std::vector<std::uint32_t> gradientNoiseRanks(const Coord& size, int cell, std::
           double weight = 1;
           for (int axis = 0; axis < 3; ++axis) {
             const int upper = corner >> axis & 1;
-            // Between the voxels: at the corners themselves all noise is 0.
+            // Voxel centres lie between the corners of cells, at which the noise is 0.
             from[axis] = (voxel[axis] % cell + 0.5) / cell - upper;
             at[axis] = (voxel[axis] / cell + upper) % cells[axis];
             weight *= fade(upper ? 1 + from[axis] : 1 - from[axis]);

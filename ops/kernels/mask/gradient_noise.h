@@ -7,11 +7,11 @@
 
 namespace vdbdither {
 
-/// The ranks, a permutation of 0 … n - 1, of the voxels of a periodic tile by the value of gradient
-/// noise (Perlin, "Improving Noise", 2002) whose cells are cubes of `cell` voxels; x fastest. Equal
-/// values are ordered by randomPermutation(n, seed). The same for a seed everywhere.
+/// Returns the ranks of the voxels of a periodic tile by the value of gradient noise (Perlin 2002)
+/// whose cells are cubes of `cell` voxels: a permutation of 0 … n - 1, x fastest. Equal values are
+/// ordered by randomPermutation(n, seed). The ranks of a seed are the same on every machine.
 ///
-/// size: each a multiple of cell; cell ≥ 2.
+/// Each of `size` must be a multiple of `cell`, and `cell` ≥ 2.
 std::vector<std::uint32_t> gradientNoiseRanks(const openvdb::Coord& size, int cell,
                                               std::uint64_t seed);
 

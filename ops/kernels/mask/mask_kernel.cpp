@@ -11,7 +11,7 @@ namespace {
 
 constexpr double pi = 3.14159265358979323846;
 
-/// exp(-x) for x ≥ 0. The library's may differ in the last bit from processor to processor.
+/// Returns exp(-x) for x ≥ 0. The library's function may differ in the last bit between processors.
 double decay(double x) {
   if (x > 700) return 0;
   int halvings = 0;
@@ -25,7 +25,7 @@ double decay(double x) {
   return sum;
 }
 
-/// cos(2π·part/whole) for 0 ≤ part < whole, for the same reason.
+/// Returns cos(2π·part/whole) for 0 ≤ part < whole, for the same reason.
 double cosineOfTurn(int part, int whole) {
   if (2 * part > whole) part = whole - part;
   const bool flip = 4 * part > whole;

@@ -7,7 +7,7 @@
 
 namespace vdbdither {
 
-/// How the energy around a set voxel of a mask falls off.
+/// The energy around a set voxel of a mask.
 struct MaskKernel {
   enum class Shape {
     peters,  ///< the Gaussian as a filter on the DFT: exp(-2π²σ²f²) up to the Nyquist frequency, so
@@ -23,14 +23,14 @@ struct MaskKernel {
 };
 
 /// A mask kernel on the torus of a periodic tile: summed over all repetitions of the tile and
-/// scaled to 1 at the origin. Made of +, -, · and / alone, so it has the same bits on every machine
-/// that computes in IEEE doubles.
+/// scaled to 1 at the origin. It is computed with +, -, · and / alone and so has the same bits on
+/// every machine with IEEE doubles.
 class ToroidalKernel {
  public:
-  /// size: the period along x, y, z, each ≥ 1.
+  /// `size` is the period along x, y, z, each ≥ 1.
   ToroidalKernel(const MaskKernel& kernel, const openvdb::Coord& size);
 
-  /// The kernel at the offset (x, y, z), each in [0, size).
+  /// Returns the kernel at the offset (x, y, z), each in [0, size).
   [[nodiscard]] double operator()(int x, int y, int z) const;
 
  private:

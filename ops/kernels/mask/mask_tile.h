@@ -11,24 +11,24 @@
 
 namespace vdbdither {
 
-/// A grid `mask` without voxels whose metadata say what it is: `mask:size` and `mask:kind`.
+/// Returns a grid `mask` without voxels, with the metadata `mask:size` and `mask:kind`.
 openvdb::FloatGrid::Ptr emptyMask(const openvdb::Coord& size, const std::string& kind);
 
-/// The same of a void-and-cluster mask: with its seed and kernel, and with `mask:generation`, which
-/// rises whenever the same settings come to give other ranks.
+/// The same for a void-and-cluster mask, also with its seed, its kernel and `mask:generation`,
+/// which is raised whenever a change of the program gives other ranks for the same settings.
 openvdb::FloatGrid::Ptr emptyMask(const VoidAndCluster& settings);
 
-/// Puts the thresholds (rank + ½) / n of the layers begin ≤ z < end into a grid made by emptyMask.
-/// ranks: the n of the whole tile, x fastest.
+/// Adds the thresholds (rank + ½) / n of the layers begin ≤ z < end to a grid made by emptyMask.
+/// `ranks` are the n ranks of the whole tile, x fastest.
 void addThresholds(std::span<const std::uint32_t> ranks, int begin, int end,
                    openvdb::FloatGrid& mask);
 
-/// Makes a void-and-cluster mask. progress: as in voidAndCluster.
+/// Makes a void-and-cluster mask. `progress` is that of voidAndCluster.
 openvdb::FloatGrid::Ptr maskOf(const VoidAndCluster& settings,
                                const std::function<void(double fraction)>& progress = {});
 
-/// The mask that is made with the program and installed: 64³, `axis-mix`, σ = 0.8, seed 1. Why this
-/// one: docs/masks.md.
+/// The mask that is built and installed with the program: 64³, `axis-mix`, σ = 0.8, seed 1.
+/// docs/masks.md gives the reasons.
 VoidAndCluster defaultMask();
 
 /// The mask of the paper: 128³, σ = 1.1, `peters`, seed 1.

@@ -3,7 +3,7 @@
 // Radial averages as in Lau and Arce, "Modern digital halftoning" (2001). The voxel plane follows
 // from g(x, y, round(t)) with t = s·x + t·y + c: as round(t) - t has period 1 in t,
 // exp(2πi·f·round(t)) is the sum over m of sinc(f + m)·exp(2πi·(f + m)·t), and the mean over c
-// parts the terms.
+// separates the terms.
 #include "ops/kernels/mask/slice_spectrum.h"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ using openvdb::Vec3d;
 constexpr double pi = 3.14159265358979323846;
 constexpr int copies = 6;
 
-/// The DFT along one axis, by its definition: tiles are small.
+/// The DFT along one axis, by its definition; tiles are small.
 void transform(std::vector<std::complex<double>>& values, std::size_t length, std::size_t stride) {
   std::vector<std::complex<double>> turns(length);
   for (std::size_t i = 0; i < length; ++i)
@@ -49,7 +49,7 @@ void transform(std::vector<std::complex<double>>& values, std::size_t length, st
   });
 }
 
-/// Frequencies in [-½, ½).
+/// Returns the equivalent frequency in [-½, ½).
 float wrapped(float frequency) {
   return frequency - static_cast<float>(static_cast<int>(frequency + 1024.5f) - 1024);
 }
@@ -171,7 +171,7 @@ void SliceSpectra::addVoxelPlane(const Vec3d& normal, std::vector<double>& sums,
   const int v_axis = (w_axis + 2) % 3;
   const double s = -in_voxels[u_axis] / in_voxels[w_axis];
   const double t = -in_voxels[v_axis] / in_voxels[w_axis];
-  // The facet's metric: a step of one column goes so far in space.
+  // The facet's metric: the squared length in space of a step of one column.
   const double uu = pitch_[u_axis] * pitch_[u_axis] + s * s * pitch_[w_axis] * pitch_[w_axis];
   const double vv = pitch_[v_axis] * pitch_[v_axis] + t * t * pitch_[w_axis] * pitch_[w_axis];
   const double uv = s * t * pitch_[w_axis] * pitch_[w_axis];
@@ -205,7 +205,7 @@ std::vector<WeightedNormal> normalsOfHalfSphere(double step_degrees) {
   const int azimuth_steps = static_cast<int>(std::round(360 / step_degrees));
   for (int i = 0; i <= polar_steps; ++i) {
     const double theta = 90.0 * i / polar_steps;
-    // The area of the ring that the step stands for; the pole is a cap, the equator half a ring.
+    // The area of the ring of a step; at the pole it is a cap, at the equator half a ring.
     const double half = 45.0 / polar_steps;
     const double area = std::cos(std::max(0.0, theta - half) * pi / 180) -
                         std::cos(std::min(90.0, theta + half) * pi / 180);
@@ -238,8 +238,8 @@ std::vector<FacetSummary> summary(const SliceSpectra& spectra,
   double weights = 0;
   constexpr std::size_t chunk = 64;
   std::vector<SliceSpectra::Facet> facets(std::min(chunk, normals.size()));
-  // Facets are made in parallel and taken in order, so that sums have the same bits on any number
-  // of threads.
+  // Facets are computed in parallel and added in order, so that sums have the same bits for any
+  // number of threads.
   for (std::size_t begin = 0; begin < normals.size(); begin += chunk) {
     const std::size_t end = std::min(normals.size(), begin + chunk);
     tbb::parallel_for(begin, end,
@@ -252,7 +252,7 @@ std::vector<FacetSummary> summary(const SliceSpectra& spectra,
         const Bands raspd = facet.raspd(s);
         for (int band = 0; band < band_count; ++band) {
           of.mean[band] += normals[i].weight * raspd[band];
-          if (facet.white[band] >= 4) of.greatest[band] = std::max(of.greatest[band], raspd[band]);
+          if (facet.white[band] >= 4) of.maximum[band] = std::max(of.maximum[band], raspd[band]);
         }
         const double low = facet.low(s);
         of.low_mean += normals[i].weight * low;

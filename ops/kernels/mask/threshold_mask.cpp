@@ -30,7 +30,7 @@ std::string text(const Coord& ijk) {
 
 }  // namespace
 
-/// Places in `values_` along one axis of the tile.
+/// Returns the offset in `values_` along one axis of the tile.
 inline std::size_t ThresholdMask::Axis::operator()(int index) const {
   if (low_bits != 0) return step * static_cast<std::size_t>(index & low_bits);
   const int rest = index % period;
@@ -87,7 +87,7 @@ float ThresholdMask::operator()(const Coord& ijk) const {
   if (values_.empty()) {
     std::uint64_t hash = mixed(seed_);
     for (int axis = 0; axis < 3; ++axis) hash = mixed(hash ^ static_cast<std::uint32_t>(ijk[axis]));
-    // The odd multiples of 2⁻²⁴: every one is a float, and none is 0 or 1.
+    // Odd multiples of 2⁻²⁴: each is exact as a float, and none is 0 or 1.
     return static_cast<float>(2 * (hash >> 41U) + 1) * 0x1p-24F;
   }
   return values_[axes_[0](ijk.x()) + axes_[1](ijk.y()) + axes_[2](ijk.z())];

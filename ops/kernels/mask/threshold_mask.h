@@ -1,5 +1,7 @@
 #pragma once
 
+// The mask family: kernels that make threshold masks, read them and measure their spectra.
+
 #include <array>
 #include <cstdint>
 #include <span>
@@ -12,15 +14,15 @@ namespace vdbdither {
 /// Thresholds M in (0, 1), a function of the absolute voxel index alone.
 class ThresholdMask {
  public:
-  /// A tile repeated in all directions. `size`: voxels per axis; `values`: size.x · size.y · size.z
-  /// of them, z fastest.
+  /// A tile of `size` voxels, repeated in all directions. `values` are size.x · size.y · size.z
+  /// thresholds, z fastest.
   ThresholdMask(const openvdb::Coord& size, std::vector<float> values);
 
-  /// The tile of a grid `mask`: active voxels from (0, 0, 0) on that fill a box. Throws DataError
-  /// where they do not, or where a value is not within (0, 1).
+  /// The tile of a grid `mask`, whose active voxels fill a box that begins at (0, 0, 0). Throws
+  /// DataError if they do not, or if a value is not within (0, 1).
   explicit ThresholdMask(const openvdb::FloatGrid& grid);
 
-  /// White noise: uniform and independent per voxel, a hash of index and seed.
+  /// White noise: uniform and independent for each voxel, a hash of index and seed.
   static ThresholdMask whiteNoise(std::uint64_t seed);
 
   /// The same threshold everywhere.
@@ -33,7 +35,7 @@ class ThresholdMask {
 
   [[nodiscard]] std::size_t bytes() const { return values_.size() * sizeof(float); }
 
-  /// M at an absolute index, negative ones included.
+  /// Returns M at an absolute index, which may be negative.
   [[nodiscard]] float operator()(const openvdb::Coord& ijk) const;
 
  private:
@@ -42,7 +44,8 @@ class ThresholdMask {
   struct Axis {
     std::size_t operator()(int index) const;
     int period = 1;
-    int low_bits = 0;  ///< of an index within a period that is a power of two; 0: of another
+    int low_bits =
+        0;  ///< mask of an index within the period; 0 if the period is not a power of two
     std::size_t step = 1;
   };
   void repeat(const openvdb::Coord& size);

@@ -1,12 +1,12 @@
 // Void and cluster: Ulichney, "The void-and-cluster method for dither array generation", SPIE 1913
-// (1993), in N dimensions as Peters, "Free blue noise textures" (2016). Ulichney's third phase,
-// which takes the tightest clusters of unset voxels, is the second one continued: on the torus the
-// energies by set and by unset voxels add up to a constant.
+// (1993), in N dimensions as by Peters, "Free blue noise textures" (2016). Ulichney's third phase,
+// which removes the tightest clusters of unset voxels, is the second one continued: on the torus
+// the energies of set and of unset voxels add up to a constant.
 //
-// The time goes into cache lines: the voxel that follows lies anywhere in the tile. So energies are
-// stored in bricks of one line, the kernel is cut into the same bricks once for every position of
-// its centre in a brick, and the extremum is found through lower bounds that are looked at again
-// only when they are the least.
+// The next voxel can lie anywhere in the tile, so that cache lines determine the time. Energies are
+// stored in bricks of one line; the kernel is cut into the same bricks, once for every position of
+// its centre in a brick; and the extremum is found through lower bounds that are updated only when
+// they are the minimum.
 #include "ops/kernels/mask/void_and_cluster.h"
 
 #include <algorithm>
@@ -23,8 +23,8 @@ using openvdb::Coord;
 
 constexpr std::size_t whole_brick = 16;
 
-/// Where voxels are stored: bricks of 4 × 2 × 2 voxels, less along axes that these do not divide,
-/// one after the other.
+/// The storage order of voxels: bricks of 4 × 2 × 2 voxels, one after the other; shorter along axes
+/// that these do not divide.
 class Bricks {
  public:
   explicit Bricks(const Coord& size) : size_(size) {
@@ -80,12 +80,12 @@ class Bricks {
   Coord count_;
 };
 
-/// How energies of one type are laid out in bits, from above: the sign, set or not, the sum of
-/// weights, the order among equals.
+/// The bits of an energy, from the highest: the sign, set or not, the sum of weights, the order
+/// among equals.
 template <class Energy>
 struct Bits {
-  /// Set voxels carry this on top of their energy: the least energy is always a void, the greatest
-  /// a cluster.
+  /// Added to the energy of set voxels, so that the minimum is always a void and the maximum a
+  /// cluster.
   static constexpr int set = std::numeric_limits<Energy>::digits - 1;
   static constexpr int ties = sizeof(Energy) == 8 ? 15 : 4;
   static constexpr int finest = 40;
@@ -94,16 +94,16 @@ struct Bits {
 /// The kernel around a centre at one position in its brick, as bricks of integer weights.
 template <class Energy>
 struct CentredKernel {
-  /// Bricks from that of the centre on, each in [0, count of bricks).
+  /// Bricks counted from that of the centre, each in [0, count of bricks).
   struct Offset {
     std::uint16_t x, y, z;
   };
   std::vector<Offset> bricks;
-  std::size_t negative_bricks = 0;  ///< how many hold a negative weight; they come first
+  std::size_t negative_bricks = 0;  ///< the number that hold a negative weight; they come first
   std::vector<Energy> weights;      ///< brick by brick
 };
 
-/// For every position of the centre in its brick.
+/// One for every position of the centre in its brick.
 template <class Energy>
 using IntegerKernel = std::vector<CentredKernel<Energy>>;
 
@@ -136,7 +136,7 @@ IntegerKernel<Energy> integerKernel(const VoidAndCluster& settings, const Bricks
       reach[axis] = std::max(reach[axis], std::min(d[axis], size[axis] - d[axis]));
   }
 
-  // Along each axis, the bricks that hold a voxel within reach of the centre's.
+  // By axis, the bricks that hold a voxel within reach of the centre's brick.
   std::array<std::vector<std::uint16_t>, 3> near;
   for (int axis = 0; axis < 3; ++axis) {
     for (int brick = 0; brick < bricks.count()[axis]; ++brick) {
@@ -165,8 +165,8 @@ IntegerKernel<Energy> integerKernel(const VoidAndCluster& settings, const Bricks
                    d.z() < 0 ? d.z() + size.z() : d.z()},
                   size)];
             }
-            const auto [least, greatest] = std::minmax_element(brick.begin(), brick.end());
-            if ((*least == 0 && *greatest == 0) || (*least < 0) != negative) continue;
+            const auto [minimum, maximum] = std::minmax_element(brick.begin(), brick.end());
+            if ((*minimum == 0 && *maximum == 0) || (*minimum < 0) != negative) continue;
             centred.bricks.push_back({x, y, z});
             centred.weights.insert(centred.weights.end(), brick.begin(), brick.end());
           }
@@ -178,7 +178,7 @@ IntegerKernel<Energy> integerKernel(const VoidAndCluster& settings, const Bricks
   return result;
 }
 
-/// The energies of a tile and where the bricks around one of them lie.
+/// The energies of a tile, and the places of the bricks around each brick.
 template <class Energy>
 class Tile {
  public:
@@ -194,7 +194,7 @@ class Tile {
   [[nodiscard]] const Bricks& bricks() const { return bricks_; }
   [[nodiscard]] std::vector<Energy>& energies() { return energies_; }
   [[nodiscard]] const std::vector<Energy>& energies() const { return energies_; }
-  /// Where the brick stored from [x] + [y] + [z] of these on is, for offsets from `brick`.
+  /// Returns tables by x, y and z of offsets from `brick`: their sum is where the brick is stored.
   [[nodiscard]] std::array<const std::size_t*, 3> from(const Coord& brick) const {
     return {steps_[0].data() + brick.x(), steps_[1].data() + brick.y(),
             steps_[2].data() + brick.z()};
@@ -206,15 +206,15 @@ class Tile {
   std::array<std::vector<std::size_t>, 3> steps_;
 };
 
-/// Bounds are kept for groups of this many values, and for groups of as many groups.
+/// Bounds exist for groups of this many values, and for groups of as many groups.
 constexpr std::size_t group = 64;
 
 /// Lower bounds of sign · energy: of every group of energies, of every group of those, and so on.
 template <class Energy>
 using Bounds = std::vector<std::vector<Energy>>;
 
-/// Adds the kernel around a voxel (sign 1) or takes it away (sign -1). Bricks of `fixed` voxels
-/// where it is not zero.
+/// Adds the kernel around a voxel (sign 1) or subtracts it (sign -1). Bricks have `fixed` voxels if
+/// it is not zero.
 template <int sign, std::size_t fixed, class Energy>
 [[gnu::always_inline]] inline void deposit(Tile<Energy>& tile, const IntegerKernel<Energy>& kernel,
                                            const Coord& centre) {
@@ -223,8 +223,8 @@ template <int sign, std::size_t fixed, class Energy>
   const auto [x, y, z] = tile.from(tile.bricks().brickOf(centre));
   Energy* const energies = tile.energies().data();
   const Energy* __restrict weight = centred.weights.data();
-  // All lines are asked for before the first is needed: this halves the time of a tile beyond the
-  // cache.
+  // All lines are prefetched before the first is needed, which halves the time of a tile larger
+  // than the cache.
   for (const auto& brick : centred.bricks) {
     __builtin_prefetch(energies + x[brick.x] + y[brick.y] + z[brick.z], 1);
   }
@@ -235,12 +235,12 @@ template <int sign, std::size_t fixed, class Energy>
   }
 }
 
-/// The least of sign · value over `count` ≥ 1 values.
+/// Returns the minimum of sign · value over `count` ≥ 1 values.
 template <int sign, class Energy>
-[[gnu::always_inline]] inline Energy leastOf(const Energy* values, std::size_t count) {
-  Energy least = std::numeric_limits<Energy>::max();
-  for (std::size_t i = 0; i < count; ++i) least = std::min<Energy>(least, sign * values[i]);
-  return least;
+[[gnu::always_inline]] inline Energy minimumOf(const Energy* values, std::size_t count) {
+  Energy minimum = std::numeric_limits<Energy>::max();
+  for (std::size_t i = 0; i < count; ++i) minimum = std::min<Energy>(minimum, sign * values[i]);
+  return minimum;
 }
 
 /// Lowers the bounds to the energies in the first bricks of the kernel around `centre`.
@@ -254,20 +254,20 @@ template <int sign, std::size_t fixed, class Energy>
   for (std::size_t i = 0; i < brick_count; ++i) {
     const auto& brick = kernel.bricks[i];
     std::size_t at = x[brick.x] + y[brick.y] + z[brick.z];
-    const Energy least = leastOf<sign>(tile.energies().data() + at, volume);
+    const Energy minimum = minimumOf<sign>(tile.energies().data() + at, volume);
     for (std::vector<Energy>& level : bounds) {
       at /= group;
-      if (level[at] <= least) break;
-      level[at] = least;
+      if (level[at] <= minimum) break;
+      level[at] = minimum;
     }
   }
 }
 
-/// The loops above, compiled for an instruction set.
+/// The functions above, compiled for an instruction set.
 template <int sign, class Energy>
 struct Loops {
   void (*deposit)(Tile<Energy>&, const IntegerKernel<Energy>&, const Coord&);
-  Energy (*least)(const Energy*, std::size_t);
+  Energy (*minimum)(const Energy*, std::size_t);
   void (*lower_bounds)(const Tile<Energy>&, const CentredKernel<Energy>&, std::size_t, const Coord&,
                        Bounds<Energy>&);
 };
@@ -277,8 +277,8 @@ void depositBaseline(Tile<Energy>& tile, const IntegerKernel<Energy>& kernel, co
   deposit<sign, fixed>(tile, kernel, centre);
 }
 template <int sign, class Energy>
-Energy leastBaseline(const Energy* values, std::size_t count) {
-  return leastOf<sign>(values, count);
+Energy minimumBaseline(const Energy* values, std::size_t count) {
+  return minimumOf<sign>(values, count);
 }
 template <int sign, std::size_t fixed, class Energy>
 void lowerBoundsBaseline(const Tile<Energy>& tile, const CentredKernel<Energy>& kernel,
@@ -298,8 +298,8 @@ VDBDITHER_AVX2 void depositAvx2(Tile<Energy>& tile, const IntegerKernel<Energy>&
   deposit<sign, fixed>(tile, kernel, centre);
 }
 template <int sign, class Energy>
-VDBDITHER_AVX2 Energy leastAvx2(const Energy* values, std::size_t count) {
-  return leastOf<sign>(values, count);
+VDBDITHER_AVX2 Energy minimumAvx2(const Energy* values, std::size_t count) {
+  return minimumOf<sign>(values, count);
 }
 template <int sign, std::size_t fixed, class Energy>
 VDBDITHER_AVX2 void lowerBoundsAvx2(const Tile<Energy>& tile, const CentredKernel<Energy>& kernel,
@@ -311,10 +311,10 @@ VDBDITHER_AVX2 void lowerBoundsAvx2(const Tile<Energy>& tile, const CentredKerne
 template <int sign, std::size_t fixed, class Energy>
 Loops<sign, Energy> loopsFor(InstructionSet instructions) {
   if (instructions == InstructionSet::avx2) {
-    return {depositAvx2<sign, fixed, Energy>, leastAvx2<sign, Energy>,
+    return {depositAvx2<sign, fixed, Energy>, minimumAvx2<sign, Energy>,
             lowerBoundsAvx2<sign, fixed, Energy>};
   }
-  return {depositBaseline<sign, fixed, Energy>, leastBaseline<sign, Energy>,
+  return {depositBaseline<sign, fixed, Energy>, minimumBaseline<sign, Energy>,
           lowerBoundsBaseline<sign, fixed, Energy>};
 }
 
@@ -324,15 +324,15 @@ Loops<sign, Energy> loopsFor(InstructionSet instructions, const Bricks& bricks) 
                                         : loopsFor<sign, 0, Energy>(instructions);
 }
 
-/// Finds the voxel where sign · energy is least, the first stored of equals. Energies that rise
-/// leave its bounds true.
+/// Finds the voxel with the minimum of sign · energy, the first stored of equals. The bounds stay
+/// valid when energies rise.
 template <int sign, class Energy>
 class Extremum {
  public:
   Extremum(const Tile<Energy>& tile, InstructionSet instructions)
       : tile_(tile),
         loops_(loopsFor<sign, Energy>(instructions, tile.bricks())),
-        least_bound_(loopsFor<1, Energy>(instructions, tile.bricks()).least) {
+        minimum_bound_(loopsFor<1, Energy>(instructions, tile.bricks()).minimum) {
     std::size_t count = tile.energies().size();
     do {
       count = (count + group - 1) / group;
@@ -340,7 +340,7 @@ class Extremum {
     } while (count > 1);
   }
 
-  /// Keeps the bounds true after the kernel around `centre` was added (change 1) or taken away
+  /// Keeps the bounds valid after the kernel around `centre` was added (change 1) or subtracted
   /// (change -1).
   void follow(const IntegerKernel<Energy>& kernel, const Coord& centre, int change) {
     const CentredKernel<Energy>& centred = kernel[tile_.bricks().positionInBrick(centre)];
@@ -355,17 +355,17 @@ class Extremum {
     while (true) {
       std::size_t at = 0;
       for (auto level = bounds_.rbegin(); level != bounds_.rend(); ++level)
-        at = whereLeast(*level, at);
+        at = whereMinimum(*level, at);
       if (at == exact) {
         std::size_t found = at * group;
         while (sign * energies[found] != bounds_[0][at]) ++found;
         return tile_.bricks().voxel(found);
       }
       exact = at;
-      bounds_[0][at] = loops_.least(energies.data() + at * group, groupSize(energies, at));
+      bounds_[0][at] = loops_.minimum(energies.data() + at * group, groupSize(energies, at));
       for (std::size_t level = 1; level < bounds_.size(); ++level) {
         at /= group;
-        bounds_[level][at] = leastBound(bounds_[level - 1], at);
+        bounds_[level][at] = minimumBound(bounds_[level - 1], at);
       }
     }
   }
@@ -374,23 +374,23 @@ class Extremum {
   static std::size_t groupSize(const std::vector<Energy>& values, std::size_t at) {
     return std::min(group, values.size() - at * group);
   }
-  Energy leastBound(const std::vector<Energy>& bounds, std::size_t at) const {
-    return least_bound_(bounds.data() + at * group, groupSize(bounds, at));
+  Energy minimumBound(const std::vector<Energy>& bounds, std::size_t at) const {
+    return minimum_bound_(bounds.data() + at * group, groupSize(bounds, at));
   }
-  std::size_t whereLeast(const std::vector<Energy>& bounds, std::size_t at) const {
-    const Energy least = leastBound(bounds, at);
+  std::size_t whereMinimum(const std::vector<Energy>& bounds, std::size_t at) const {
+    const Energy minimum = minimumBound(bounds, at);
     std::size_t where = at * group;
-    while (bounds[where] != least) ++where;
+    while (bounds[where] != minimum) ++where;
     return where;
   }
 
   const Tile<Energy>& tile_;
   Loops<sign, Energy> loops_;
-  Energy (*least_bound_)(const Energy*, std::size_t);
+  Energy (*minimum_bound_)(const Energy*, std::size_t);
   Bounds<Energy> bounds_;
 };
 
-/// Counts the steps of a run and reports now and then.
+/// Counts the steps of a run and reports from time to time.
 class Progress {
  public:
   Progress(const std::function<void(double)>& report, double steps)
@@ -513,7 +513,7 @@ double voidAndClusterSeconds(const VoidAndCluster& settings) {
   const double smallest =
       small ? std::ldexp(1.0, -1 - Bits<std::int64_t>::finest) : smallestWeight(size);
   const ToroidalKernel kernel(settings.kernel, size);
-  // The kernel is even along every axis.
+  // The kernel is symmetric along every axis.
   double looked_at = 0;
   double weights = 0;
   for (int z = 0; z <= size.z() / 2; ++z) {
@@ -527,7 +527,7 @@ double voidAndClusterSeconds(const VoidAndCluster& settings) {
   const double voxels = static_cast<double>(size.x()) * size.y() * size.z();
   const double steps = voxels + initialCount(static_cast<std::uint32_t>(voxels));
   const double touched = weights / looked_at * voxels;
-  // Beyond a million voxels, energies come from outside the cache.
+  // Above a million voxels the energies do not fit the cache.
   const double ns_per_weight = voxels > 1 << 20 ? 2.6 : 1;
   return 1e-9 * steps * (500 + ns_per_weight * touched);
 }

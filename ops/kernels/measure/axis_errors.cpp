@@ -28,7 +28,7 @@ struct Sums {
   }
 };
 
-/// The axis along which a unit vector is longest, and whether it goes up or down along it.
+/// The axis of the largest component of a unit vector, and the component's sign.
 struct Facing {
   std::size_t axis;
   std::size_t up;
@@ -49,8 +49,8 @@ std::array<AxisError, 3> axisErrors(const SurfaceErrors& errors, const ClosestPo
   struct AxisSums {
     Sums position, error, size;
     double product = 0;
-    // Errors along and against the axis apart, for outwards is up on one side and down on the
-    // other.
+    // Errors are separated by the sign of the direction, because outwards is up on one side and
+    // down on the other.
     std::array<Sums, 2> sides;
     std::array<std::array<Sums, phases>, 2> by_phase;
   };

@@ -1,3 +1,5 @@
+// Sa and Sq: ISO 25178-2. The Gaussian filter: ISO 16610-61.
+
 #include "ops/kernels/measure/facet_roughness.h"
 
 #include <algorithm>
@@ -27,11 +29,10 @@ Vec3d areaNormal(const Mesh& mesh, std::uint32_t triangle) {
   return (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a) * 0.5;
 }
 
-/// The sides at which a facet ends, as triangles without area.
+/// The edges at which a facet ends, as triangles without area.
 Mesh borderOf(const Mesh& mesh, const MeshEdges& edges, const std::vector<std::uint32_t>& facets,
               std::uint32_t facet, std::span<const std::uint32_t> facet_edges) {
   Mesh border;
-  border.vertices = {};
   for (const std::uint32_t edge : facet_edges) {
     std::size_t own = 0;
     for (const std::uint32_t half : edges.halves(edge)) own += facets[half / 3] == facet;
@@ -70,7 +71,7 @@ void filterRows(std::vector<double>& values, int rows, int columns, bool along_c
 }  // namespace
 
 std::vector<std::uint32_t> facetsOf(const Mesh& mesh) {
-  const double least_cosine = std::cos(0.01 * std::numbers::pi / 180);
+  const double minimum_cosine = std::cos(0.01 * std::numbers::pi / 180);
   const MeshEdges edges(mesh);
   std::vector<std::array<std::uint32_t, 3>> edge_of_side(mesh.triangles.size(),
                                                          {nothing, nothing, nothing});
@@ -94,7 +95,7 @@ std::vector<std::uint32_t> facetsOf(const Mesh& mesh) {
           const std::uint32_t other = half / 3;
           const Vec3d beside = areaNormal(mesh, other);
           if (facets[other] != nothing ||
-              !(normal.dot(beside) > least_cosine * normal.length() * beside.length()))
+              !(normal.dot(beside) > minimum_cosine * normal.length() * beside.length()))
             continue;
           facets[other] = count;
           open.push_back(other);
@@ -169,9 +170,9 @@ double HeightField::rmsBeyond(double cutoff_mm) const {
     low = openvdb::math::minComponent(low, p);
     high = openvdb::math::maxComponent(high, p);
   }
-  constexpr int most_pixels = 4096;
+  constexpr int maximum_pixels = 4096;
   const double extent = std::max(high.x() - low.x(), high.y() - low.y());
-  const double pixel_mm = std::max(cutoff_mm / 8, extent / most_pixels);
+  const double pixel_mm = std::max(cutoff_mm / 8, extent / maximum_pixels);
   const int columns = static_cast<int>((high.x() - low.x()) / pixel_mm) + 1;
   const int rows = static_cast<int>((high.y() - low.y()) / pixel_mm) + 1;
   const std::size_t size = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
@@ -206,87 +207,133 @@ double HeightField::rmsBeyond(double cutoff_mm) const {
   return of > 0 ? std::sqrt(sum / of) : 0;
 }
 
+namespace {
+
+/// The facets to measure, largest first, with their areas and (not yet unit) normals.
+struct ChosenFacets {
+  std::vector<FacetRoughness> facets;
+  std::vector<std::uint32_t> numbers;  ///< of the facets, as `facetsOf` counts them
+  std::vector<std::uint32_t> place;    ///< by facet number: its place among the chosen, or nothing
+};
+
+ChosenFacets chosenFacets(const Mesh& mesh, const std::vector<std::uint32_t>& facet_of,
+                          const RoughnessRules& rules) {
+  std::vector<FacetRoughness> all;
+  for (std::uint32_t t = 0; t < facet_of.size(); ++t) {
+    if (facet_of[t] == all.size()) all.push_back({t, Vec3d(0.0)});
+    const Vec3d area = areaNormal(mesh, t);
+    all[facet_of[t]].normal += area;
+    all[facet_of[t]].area_mm2 += area.length();
+  }
+  ChosenFacets chosen;
+  for (std::uint32_t facet = 0; facet < all.size(); ++facet) {
+    if (all[facet].area_mm2 >= rules.minimum_area_mm2) chosen.numbers.push_back(facet);
+  }
+  std::sort(chosen.numbers.begin(), chosen.numbers.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(-all[a].area_mm2, a) < std::pair(-all[b].area_mm2, b);
+  });
+  if (chosen.numbers.size() > rules.maximum_facets) chosen.numbers.resize(rules.maximum_facets);
+  chosen.place.assign(all.size(), nothing);
+  for (std::uint32_t n = 0; n < chosen.numbers.size(); ++n) {
+    chosen.place[chosen.numbers[n]] = n;
+    chosen.facets.push_back(all[chosen.numbers[n]]);
+  }
+  return chosen;
+}
+
+/// For each chosen facet the edges of its triangles, in rising order.
+std::vector<std::vector<std::uint32_t>> edgesByFacet(const MeshEdges& edges,
+                                                     const std::vector<std::uint32_t>& facet_of,
+                                                     const ChosenFacets& chosen) {
+  std::vector<std::vector<std::uint32_t>> result(chosen.facets.size());
+  for (std::uint32_t edge = 0; edge < edges.size(); ++edge) {
+    for (const std::uint32_t half : edges.halves(edge)) {
+      const std::uint32_t n = chosen.place[facet_of[half / 3]];
+      if (n != nothing && (result[n].empty() || result[n].back() != edge))
+        result[n].push_back(edge);
+    }
+  }
+  return result;
+}
+
+/// For each chosen facet the measured points whose nearest triangle belongs to it.
+std::vector<std::vector<std::uint32_t>> pointsByFacet(const SurfaceErrors& errors,
+                                                      const std::vector<std::uint32_t>& facet_of,
+                                                      const ChosenFacets& chosen) {
+  std::vector<std::vector<std::uint32_t>> result(chosen.facets.size());
+  for (std::size_t n = 0; n < errors.size(); ++n) {
+    const std::uint32_t to = chosen.place[facet_of[errors.triangle[n]]];
+    if (to != nothing && errors.weight_mm2[n] > 0)
+      result[to].push_back(static_cast<std::uint32_t>(n));
+  }
+  return result;
+}
+
+/// Removes the points that are nearer to the border of their facet than `margin_mm`.
+void dropNear(const Mesh& border, double margin_mm, const SurfaceErrors& errors,
+              std::vector<std::uint32_t>& points) {
+  if (border.triangles.empty() || !(margin_mm > 0)) return;
+  std::vector<char> within(points.size(), 1);
+  const ClosestPoints edge_of_facet(border);
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, points.size(), 1024), [&](const auto& range) {
+        std::uint32_t hint = 0;
+        for (std::size_t m = range.begin(); m != range.end(); ++m) {
+          const ClosestPoint found = edge_of_facet(Vec3d(errors.nearest[points[m]]), hint);
+          hint = found.triangle;
+          within[m] = std::abs(found.distance_mm) >= margin_mm;
+        }
+      });
+  std::size_t kept = 0;
+  for (std::size_t m = 0; m < points.size(); ++m)
+    if (within[m]) points[kept++] = points[m];
+  points.resize(kept);
+}
+
+/// Measures a facet at these points; its `measured_mm2` stays 0 where there are none.
+void measure(FacetRoughness& facet, const std::vector<std::uint32_t>& points,
+             const SurfaceErrors& errors, double cutoff_mm) {
+  // Directions within the facet that depend on its normal alone.
+  const Vec3d aside = std::abs(facet.normal.x()) < 0.6 ? Vec3d(1, 0, 0) : Vec3d(0, 1, 0);
+  const Vec3d u = facet.normal.cross(aside).unit();
+  const Vec3d v = facet.normal.cross(u);
+  HeightField field;
+  double sum = 0;
+  for (const std::uint32_t point : points) {
+    const Vec3d at(errors.nearest[point]);
+    field.at_mm.emplace_back(at.dot(u), at.dot(v));
+    field.height_mm.push_back(errors.error_mm[point]);
+    field.weight.push_back(errors.weight_mm2[point]);
+    facet.measured_mm2 += errors.weight_mm2[point];
+    sum += errors.weight_mm2[point] * errors.error_mm[point];
+  }
+  if (!(facet.measured_mm2 > 0)) return;
+  facet.bias_mm = sum / facet.measured_mm2;
+  field.level();
+  facet.sa_mm = field.meanSize();
+  facet.sq_mm = field.rms();
+  facet.sq_band_mm = field.rmsBeyond(cutoff_mm);
+}
+
+}  // namespace
+
 std::vector<FacetRoughness> facetRoughness(const SurfaceErrors& errors,
                                            const ClosestPoints& reference,
                                            const RoughnessRules& rules) {
   const Mesh& mesh = reference.mesh();
-  const std::vector<std::uint32_t> facets = facetsOf(mesh);
-  std::vector<FacetRoughness> all;
-  for (std::uint32_t t = 0; t < facets.size(); ++t) {
-    if (facets[t] == all.size()) all.push_back({t, Vec3d(0.0)});
-    const Vec3d area = areaNormal(mesh, t);
-    all[facets[t]].normal += area;
-    all[facets[t]].area_mm2 += area.length();
-  }
-  // The largest, by their place in the result.
-  std::vector<std::uint32_t> kept;
-  for (std::uint32_t facet = 0; facet < all.size(); ++facet) {
-    if (all[facet].area_mm2 >= rules.least_area_mm2) kept.push_back(facet);
-  }
-  std::sort(kept.begin(), kept.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return std::pair(-all[a].area_mm2, a) < std::pair(-all[b].area_mm2, b);
-  });
-  if (kept.size() > rules.most_facets) kept.resize(rules.most_facets);
-  std::vector<std::uint32_t> place(all.size(), nothing);
-  for (std::uint32_t n = 0; n < kept.size(); ++n) place[kept[n]] = n;
-
+  const std::vector<std::uint32_t> facet_of = facetsOf(mesh);
+  const ChosenFacets chosen = chosenFacets(mesh, facet_of, rules);
   const MeshEdges edges(mesh);
-  std::vector<std::vector<std::uint32_t>> facet_edges(kept.size());
-  for (std::uint32_t edge = 0; edge < edges.size(); ++edge) {
-    for (const std::uint32_t half : edges.halves(edge)) {
-      const std::uint32_t n = place[facets[half / 3]];
-      if (n != nothing && (facet_edges[n].empty() || facet_edges[n].back() != edge))
-        facet_edges[n].push_back(edge);
-    }
-  }
-  std::vector<std::vector<std::uint32_t>> points(kept.size());
-  for (std::size_t n = 0; n < errors.size(); ++n) {
-    const std::uint32_t to = place[facets[errors.triangle[n]]];
-    if (to != nothing && errors.weight_mm2[n] > 0)
-      points[to].push_back(static_cast<std::uint32_t>(n));
-  }
-
+  const auto facet_edges = edgesByFacet(edges, facet_of, chosen);
+  auto points = pointsByFacet(errors, facet_of, chosen);
   std::vector<FacetRoughness> result;
-  for (std::size_t n = 0; n < kept.size(); ++n) {
-    FacetRoughness made = all[kept[n]];
-    made.normal.normalize();
-    const Mesh border = borderOf(mesh, edges, facets, kept[n], facet_edges[n]);
-    std::vector<char> within(points[n].size(), 1);
-    if (!border.triangles.empty() && rules.margin_mm > 0) {
-      const ClosestPoints edge_of_facet(border);
-      tbb::parallel_for(
-          tbb::blocked_range<std::size_t>(0, points[n].size(), 1024), [&](const auto& range) {
-            std::uint32_t hint = 0;
-            for (std::size_t m = range.begin(); m != range.end(); ++m) {
-              const ClosestPoint found = edge_of_facet(Vec3d(errors.nearest[points[n][m]]), hint);
-              hint = found.triangle;
-              within[m] = std::abs(found.distance_mm) >= rules.margin_mm;
-            }
-          });
-    }
-    // Directions within the facet that depend on its normal alone.
-    const Vec3d aside = std::abs(made.normal.x()) < 0.6 ? Vec3d(1, 0, 0) : Vec3d(0, 1, 0);
-    const Vec3d u = made.normal.cross(aside).unit();
-    const Vec3d v = made.normal.cross(u);
-    HeightField field;
-    double sum = 0;
-    for (std::size_t m = 0; m < points[n].size(); ++m) {
-      if (!within[m]) continue;
-      const std::uint32_t point = points[n][m];
-      const Vec3d at(errors.nearest[point]);
-      field.at_mm.emplace_back(at.dot(u), at.dot(v));
-      field.height_mm.push_back(errors.error_mm[point]);
-      field.weight.push_back(errors.weight_mm2[point]);
-      made.measured_mm2 += errors.weight_mm2[point];
-      sum += errors.weight_mm2[point] * errors.error_mm[point];
-    }
-    if (!(made.measured_mm2 > 0)) continue;
-    made.bias_mm = sum / made.measured_mm2;
-    field.level();
-    made.sa_mm = field.meanSize();
-    made.sq_mm = field.rms();
-    made.sq_band_mm = field.rmsBeyond(rules.cutoff_mm);
-    result.push_back(made);
+  for (std::size_t n = 0; n < chosen.facets.size(); ++n) {
+    FacetRoughness facet = chosen.facets[n];
+    facet.normal.normalize();
+    const Mesh border = borderOf(mesh, edges, facet_of, chosen.numbers[n], facet_edges[n]);
+    dropNear(border, rules.margin_mm, errors, points[n]);
+    measure(facet, points[n], errors, rules.cutoff_mm);
+    if (facet.measured_mm2 > 0) result.push_back(facet);
   }
   return result;
 }

@@ -113,7 +113,7 @@ class Walk {
             std::uint64_t voxels) {
     const double apart = distance(a, b);
     if (a_active == b_active && apart <= tolerance_) return;
-    // What is not a number is further away than any number.
+    // The difference from nan is infinite.
     found_.add({voxels, at, std::isnan(apart) ? std::numeric_limits<double>::infinity() : apart});
   }
 

@@ -6,19 +6,19 @@
 
 namespace vdbdither {
 
-/// Where two grids hold different voxels.
+/// The differences between two grids.
 struct GridDifference {
   std::uint64_t voxels = 0;
-  openvdb::Coord first;  ///< of them the lowest, then the one with the least y, then x
-  double largest = 0;    ///< of the components; 0 where only states differ
+  openvdb::Coord first;  ///< the first different voxel, by z, then y, then x
+  double largest = 0;    ///< maximum difference of a component; 0 if only states differ
 
-  /// Takes in what was found elsewhere.
+  /// Adds the differences in other layers.
   void add(const GridDifference& other);
 };
 
-/// The voxels at which `a` and `b`, grids of one type, differ: in being active, or in value by more
-/// than `tolerance` (nan equals nan). Tiles are compared as tiles. Throws DataError for types that
-/// slabs cannot carry.
+/// Compares two grids of one type. Voxels differ in their state, or in value by more than
+/// `tolerance` (nan equals nan). Tiles are compared as tiles. Throws DataError for types that slabs
+/// cannot carry.
 GridDifference gridDifference(const openvdb::GridBase& a, const openvdb::GridBase& b,
                               double tolerance);
 

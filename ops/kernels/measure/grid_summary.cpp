@@ -21,7 +21,7 @@ Vec3d asVector(const T& value) {
   }
 }
 
-/// Takes values in, one after the other.
+/// Adds values one by one.
 class Collector {
  public:
   explicit Collector(GridSummary& summary) : summary_(summary) {}
@@ -30,11 +30,11 @@ class Collector {
   void add(const Value& value, std::uint64_t voxels) {
     const Vec3d at = asVector(value);
     const bool first = summary_.active_voxels == 0;
-    summary_.least = first ? at : openvdb::math::minComponent(summary_.least, at);
-    summary_.greatest = first ? at : openvdb::math::maxComponent(summary_.greatest, at);
+    summary_.minimum = first ? at : openvdb::math::minComponent(summary_.minimum, at);
+    summary_.maximum = first ? at : openvdb::math::maxComponent(summary_.maximum, at);
     summary_.active_voxels += voxels;
     if constexpr (std::is_same_v<Value, std::int32_t>) {
-      // Neighbours mostly agree, which spares the search.
+      // Consecutive values are mostly equal, which avoids the search.
       if (!count_ || count_->first != value) count_ = &*summary_.counts.try_emplace(value).first;
       count_->second += voxels;
     }
@@ -51,8 +51,8 @@ void GridSummary::add(const GridSummary& other) {
   leaves += other.leaves;
   leaf_bytes += other.leaf_bytes;
   if (other.active_voxels == 0) return;
-  least = active_voxels ? openvdb::math::minComponent(least, other.least) : other.least;
-  greatest = active_voxels ? openvdb::math::maxComponent(greatest, other.greatest) : other.greatest;
+  minimum = active_voxels ? openvdb::math::minComponent(minimum, other.minimum) : other.minimum;
+  maximum = active_voxels ? openvdb::math::maxComponent(maximum, other.maximum) : other.maximum;
   active_voxels += other.active_voxels;
   box.expand(other.box);
   for (const auto& [value, voxels] : other.counts) counts[value] += voxels;

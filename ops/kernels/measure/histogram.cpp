@@ -5,7 +5,8 @@
 
 namespace vdbdither {
 
-Histogram::Histogram(int bins, int least_exponent) : most_(bins), exponent_(least_exponent) {}
+Histogram::Histogram(int bins, int minimum_exponent)
+    : maximum_(bins), exponent_(minimum_exponent) {}
 
 void Histogram::add(double value, std::uint64_t count) {
   if (!std::isfinite(value)) {
@@ -20,7 +21,8 @@ void Histogram::add(double value, std::uint64_t count) {
     return;
   }
   const auto last = [&] { return static_cast<double>(first_ + std::ssize(counts_) - 1); };
-  while (std::max(bin(), last()) - std::min(bin(), static_cast<double>(first_)) >= most_) widen();
+  while (std::max(bin(), last()) - std::min(bin(), static_cast<double>(first_)) >= maximum_)
+    widen();
   const auto place = static_cast<std::int64_t>(bin());
   if (place < first_) {
     counts_.insert(counts_.begin(), static_cast<std::size_t>(first_ - place), 0);
@@ -32,7 +34,7 @@ void Histogram::add(double value, std::uint64_t count) {
 }
 
 void Histogram::widen() {
-  // The shift rounds down, below zero too.
+  // The shift rounds down, also below zero.
   const std::int64_t first = first_ >> 1;
   std::vector<std::uint64_t> counts(
       static_cast<std::size_t>(((first_ + std::ssize(counts_) - 1) >> 1) - first + 1), 0);

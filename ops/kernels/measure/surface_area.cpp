@@ -1,3 +1,6 @@
+// Marching tetrahedra: Doi, Koide: "An Efficient Method of Triangulating Equi-Valued Surfaces by
+// Using Tetrahedral Cells", IEICE Transactions E74(1), 1991.
+
 #include "ops/kernels/measure/surface_area.h"
 
 #include <array>
@@ -17,10 +20,10 @@ namespace {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// Corner n of a cell is its least one moved by the bits of n along x, y and z.
+/// Corner n of a cell is offset from the lowest one by the bits of n along x, y and z.
 Coord corner(int n) { return {n & 1, n >> 1 & 1, n >> 2 & 1}; }
 
-/// The tetrahedra that a cell falls into: all lie about the diagonal from corner 0 to corner 7.
+/// The tetrahedra of a cell, which share the diagonal from corner 0 to corner 7.
 constexpr std::array<std::array<int, 4>, 6> tetrahedra{
     {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7}, {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}}};
 
@@ -28,7 +31,8 @@ double triangleArea(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   return 0.5 * (b - a).cross(c - a).length();
 }
 
-/// Area within a tetrahedron of what separates the negative corners from the others.
+/// Returns the area, within a tetrahedron, of the surface between the negative corners and the
+/// others.
 double areaWithin(const std::array<int, 4>& tetrahedron, const std::array<float, 8>& distances,
                   const Vec3d& pitch_mm) {
   std::array<int, 4> inside{};

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t steps = 1000;
 
-/// Adds the points that stand for a triangle, cut into n² equal ones.
+/// Adds the points that represent a triangle, the centres of n² equal ones.
 void addCentres(const std::array<Vec3d, 3>& corners, int n, double area_mm2,
                 std::vector<Vec3d>& points, std::vector<double>& weights) {
   const Vec3d u = (corners[1] - corners[0]) / n;
@@ -40,7 +40,7 @@ ErrorStatistics statistics(std::vector<std::pair<double, double>> sizes_and_weig
     result.weight += weight;
     sum += weight * size;
     squares += weight * size * size;
-    result.most_mm = std::max(result.most_mm, size);
+    result.maximum_mm = std::max(result.maximum_mm, size);
   }
   result.quantiles_mm.assign(steps + 1, 0);
   if (!(result.weight > 0)) return result;
@@ -55,7 +55,7 @@ ErrorStatistics statistics(std::vector<std::pair<double, double>> sizes_and_weig
     for (; next <= steps && static_cast<double>(next) / steps * result.weight <= below; ++next)
       result.quantiles_mm[next] = size;
   }
-  for (; next <= steps; ++next) result.quantiles_mm[next] = result.most_mm;
+  for (; next <= steps; ++next) result.quantiles_mm[next] = result.maximum_mm;
   return result;
 }
 
@@ -89,7 +89,7 @@ SurfaceErrors surfaceErrors(const Mesh& surface, const ClosestPoints& reference,
   for (std::size_t begin = 0; begin < points.size(); begin += block) {
     const std::size_t end = std::min(points.size(), begin + block);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 1024), [&](const auto& range) {
-      // Neighbours are near the same triangle, mostly.
+      // Consecutive points are mostly near the same triangle.
       std::uint32_t hint = 0;
       for (std::size_t n = range.begin(); n != range.end(); ++n) {
         const ClosestPoint found = reference(points[n], hint);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int word_bits = 64;
 
-/// Calls visit(begin, end) for every run of set bits of a row, or with `flip` of unset ones.
+/// Calls visit(begin, end) for every run of set bits of a row; with `flip`, of unset bits.
 template <typename Visit>
 void forEachRun(const std::uint64_t* row, int words, bool flip, const Visit& visit) {
   const std::uint64_t mask = flip ? ~std::uint64_t{0} : 0;
@@ -37,7 +37,7 @@ void forEachRun(const std::uint64_t* row, int words, bool flip, const Visit& vis
   if (begin >= 0) visit(begin, words * word_bits);
 }
 
-/// Sets of numbers that are joined one by one.
+/// Disjoint sets of numbers (union-find).
 class Sets {
  public:
   explicit Sets(std::size_t count) : parent_(count) {
@@ -47,7 +47,7 @@ class Sets {
     while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
     return n;
   }
-  /// The lower number stands for both.
+  /// The lower number represents both.
   void join(std::uint32_t a, std::uint32_t b) {
     a = find(a);
     b = find(b);
@@ -58,7 +58,7 @@ class Sets {
   std::vector<std::uint32_t> parent_;
 };
 
-/// Calls join(a, b) for the runs of two rows that touch; `aside` is 1 where corners do.
+/// Calls join(a, b) for the touching runs of two rows; `aside` is 1 if corners touch.
 template <typename Run, typename Join>
 void forEachTouching(std::span<const Run> a, std::span<const Run> b, int aside, const Join& join) {
   for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
@@ -76,7 +76,7 @@ void forEachTouching(std::span<const Run> a, std::span<const Run> b, int aside, 
 VoxelComponents::VoxelComponents(const BitFrame& frame) : frame_(frame) { full_.diagonal = true; }
 
 void VoxelComponents::add(const BitLayer& layer) {
-  // The outside lies below the first layer too.
+  // The layer below the first one is outside too.
   if (!std::exchange(begun_, true)) addLayer(frame_.emptyLayer());
   addLayer(layer);
 }
@@ -89,7 +89,7 @@ VoxelComponents::Counts VoxelComponents::finish() {
     std::sort(sizes.begin(), sizes.end(), std::greater<>());
     return sizes;
   };
-  // What is open at the end is the outside.
+  // The empty pieces that are still open are the outside.
   counts.components = sorted(std::move(full_.closed));
   counts.cavities = sorted(std::move(empty_.closed));
   return counts;
@@ -141,7 +141,7 @@ void VoxelComponents::addRuns(Pieces& pieces, std::vector<Run> runs,
     }
   }
 
-  // Pieces that go on get new numbers, the others end.
+  // Pieces that continue get new numbers; the others are complete.
   constexpr auto none = ~std::uint32_t{0};
   std::vector<std::uint32_t> renamed(before + runs.size(), none);
   std::vector<std::uint64_t> open;
@@ -157,7 +157,7 @@ void VoxelComponents::addRuns(Pieces& pieces, std::vector<Run> runs,
   for (std::uint32_t piece = 0; piece < before; ++piece) {
     const std::uint32_t to = renamed[sets.find(piece)];
     if (to == none) {
-      // Pieces of before can only have been joined by runs of now.
+      // Earlier pieces can only have been joined by runs of this layer.
       pieces.closed.push_back(pieces.open[piece]);
     } else {
       open[to] += pieces.open[piece];

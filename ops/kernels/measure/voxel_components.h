@@ -9,35 +9,36 @@ namespace vdbdither {
 
 /// Counts the pieces and the cavities of a set of voxels, layer by layer.
 ///
-/// Pieces hang together by faces, edges and corners (26 neighbours), what is empty by faces (6).
-/// A cavity is an empty piece that does not reach the outside. Memory is two layers of runs.
+/// Voxels of a piece are connected by faces, edges and corners (26 neighbours), empty voxels by
+/// faces (6). A cavity is a connected set of empty voxels that does not reach the outside. Two
+/// layers of runs are held in memory.
 class VoxelComponents {
  public:
   explicit VoxelComponents(const BitFrame& frame);
 
-  /// The next layer, on top of those before.
+  /// Adds the next layer, above those before.
   void add(const BitLayer& layer);
 
   struct Counts {
-    std::vector<std::uint64_t> components;  ///< voxels of every piece, largest first
-    std::vector<std::uint64_t> cavities;    ///< likewise
+    std::vector<std::uint64_t> components;  ///< the number of voxels of every piece, largest first
+    std::vector<std::uint64_t> cavities;    ///< the same of every cavity
   };
-  /// After the last layer.
+  /// Returns the counts; must be called after the last layer.
   Counts finish();
 
  private:
-  /// Voxels of a row that follow each other: [begin, end), with the piece they belong to.
+  /// Consecutive voxels of a row, [begin, end), and their piece.
   struct Run {
     int begin, end;
     std::uint32_t piece;
   };
-  /// One kind of voxels: those set, or those that are not.
+  /// The pieces of one kind of voxels: set or empty.
   struct Pieces {
-    bool diagonal = false;              ///< whether edges and corners join
+    bool diagonal = false;              ///< whether edges and corners connect
     std::vector<Run> runs;              ///< of the last layer
-    std::vector<std::size_t> rows;      ///< where each row of it begins
+    std::vector<std::size_t> rows;      ///< where each row of the last layer begins
     std::vector<std::uint64_t> open;    ///< voxels of the pieces in the last layer, by number
-    std::vector<std::uint64_t> closed;  ///< of those that ended
+    std::vector<std::uint64_t> closed;  ///< voxels of the pieces that are complete
   };
 
   void addRuns(Pieces& pieces, std::vector<Run> runs, std::vector<std::size_t> rows) const;

@@ -1,3 +1,7 @@
+// The nearest point of a triangle: Ericson: "Real-Time Collision Detection", 2005, section
+// 5.1.5. The sign: Bærentzen, Aanæs: "Signed Distance Computation Using the Angle Weighted
+// Pseudonormal", IEEE Transactions on Visualization and Computer Graphics 11(3), 2005.
+
 #include "ops/kernels/mesh/closest_point.h"
 
 #include <algorithm>
@@ -160,12 +164,12 @@ ClosestPoint ClosestPoints::operator()(const Vec3d& p, std::uint32_t hint) const
     std::uint32_t node;
     double squared;
   };
-  std::array<Open, 96> open;  // the tree is balanced: at most two for each of 32 levels
+  std::array<Open, 96> open;  // the tree is balanced: two for each of 32 levels at most
   std::size_t count = 0;
   open[count++] = {0, squaredDistance(nodes_[0].low, nodes_[0].high, p)};
   while (count > 0) {
     const Open next = open[--count];
-    // Equally near ones count too, for the lowest of them is wanted.
+    // Nodes as near as the best one count too: they may hold a lower triangle.
     if (next.squared > best.squared) continue;
     const Node& node = nodes_[next.node];
     if (node.count > 0) {

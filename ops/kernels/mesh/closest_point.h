@@ -26,7 +26,7 @@ struct PointOnTriangle {
   }
 };
 
-/// That of the triangle a, b, c to p (Ericson: "Real-Time Collision Detection", 2005, 5.1.5).
+/// Returns the point of the triangle a, b, c nearest to p (Ericson 2005, 5.1.5).
 PointOnTriangle nearestOnTriangle(const openvdb::Vec3d& a, const openvdb::Vec3d& b,
                                   const openvdb::Vec3d& c, const openvdb::Vec3d& p);
 
@@ -34,25 +34,25 @@ PointOnTriangle nearestOnTriangle(const openvdb::Vec3d& a, const openvdb::Vec3d&
 struct ClosestPoint {
   double distance_mm = 0;      ///< negative inside the mesh
   openvdb::Vec3d point;        ///< on the mesh
-  std::uint32_t triangle = 0;  ///< that it lies on; of several the lowest
+  std::uint32_t triangle = 0;  ///< that the point lies on; the lowest of several
 };
 
 /// Exact signed distances from any point to a closed mesh, through a tree of bounding boxes.
 ///
-/// The sign is that of the angle-weighted normal where the nearest point lies (Bærentzen, Aanæs:
-/// "Signed Distance Computation Using the Angle Weighted Pseudonormal", 2005), which is right for
-/// every closed mesh that does not pass through itself. In double precision; what is found depends
-/// on the mesh and the point alone.
+/// The sign is that of the angle-weighted normal at the nearest point (Bærentzen, Aanæs 2005),
+/// which is right for every closed mesh that does not intersect itself. In double precision; the
+/// result depends on the mesh and the point alone.
 class ClosestPoints {
  public:
-  /// `mesh` in mm, with at least one triangle, outward oriented; see repaired.
+  /// `mesh` in mm, closed and facing outwards, with at least one triangle; see solidMesh.
   explicit ClosestPoints(Mesh mesh);
 
-  /// The nearest point to `p`. `hint`: a triangle that may be near, which makes it faster.
+  /// Returns the point nearest to `p`. `hint` is a triangle that may be near; a good one saves
+  /// time.
   [[nodiscard]] ClosestPoint operator()(const openvdb::Vec3d& p, std::uint32_t hint = 0) const;
 
   [[nodiscard]] const Mesh& mesh() const { return mesh_; }
-  /// Unit normal of a triangle; zero where it has no area.
+  /// Unit normal of a triangle; zero if it has no area.
   [[nodiscard]] const openvdb::Vec3d& normal(std::uint32_t triangle) const {
     return normals_[triangle];
   }
@@ -60,8 +60,8 @@ class ClosestPoints {
  private:
   struct Node {
     std::array<float, 3> low, high;  ///< rounded outwards
-    std::uint32_t begin = 0;         ///< of a leaf: in order_; else the second child
-    std::uint32_t count = 0;         ///< of a leaf; else zero, and the first child comes next
+    std::uint32_t begin = 0;         ///< of a leaf, in order_; otherwise the second child
+    std::uint32_t count = 0;         ///< of a leaf; otherwise zero, and the first child follows
   };
   struct Candidate;
 
@@ -72,7 +72,7 @@ class ClosestPoints {
 
   Mesh mesh_;
   std::vector<openvdb::Vec3d> normals_;         ///< by triangle
-  std::vector<openvdb::Vec3d> edge_normals_;    ///< by side, of the two triangles at it
+  std::vector<openvdb::Vec3d> edge_normals_;    ///< by side, the sum over its two triangles
   std::vector<openvdb::Vec3d> vertex_normals_;  ///< weighted by angle
   std::vector<std::uint32_t> order_;
   std::vector<Node> nodes_;

@@ -12,13 +12,13 @@
 
 namespace vdbdither {
 
-/// A place on a grid, in the order of z, y, x. There is room for five more bits on its right.
+/// A place on a grid, ordered by z, y, x. Five more bits fit on its right.
 using Key = std::uint64_t;
 
 constexpr int key_bits = 19;
 constexpr int key_offset = 1 << (key_bits - 1);
 
-/// Of indices from −2^18 to 2^18 − 1.
+/// Packs indices from −2^18 to 2^18 − 1.
 inline Key keyOf(const openvdb::Coord& ijk) {
   const auto part = [](int index) { return static_cast<Key>(index + key_offset); };
   return part(ijk.z()) << 2 * key_bits | part(ijk.y()) << key_bits | part(ijk.x());
@@ -30,7 +30,7 @@ inline openvdb::Coord coordOf(Key key) {
   return {part(key), part(key >> key_bits), part(key >> 2 * key_bits)};
 }
 
-/// Values by key, never walked through: open addressing, for millions of them.
+/// A hash map from keys to millions of values, by open addressing; it cannot be iterated.
 template <class T>
 class KeyMap {
  public:
@@ -41,7 +41,7 @@ class KeyMap {
   }
   [[nodiscard]] bool contains(Key key) const { return find(key) != nullptr; }
   [[nodiscard]] const T& at(Key key) const { return *find(key); }
-  /// Returns the value, and whether it is this one that is new.
+  /// Adds `value` if the key is new. Returns the value of the key, and whether it was added.
   std::pair<T&, bool> add(Key key, const T& value) {
     if (2 * count_ >= slots_.size()) grow();
     Slot& slot = slots_[placeOf(key)];
@@ -60,7 +60,7 @@ class KeyMap {
     T value{};
   };
 
-  /// Where the key is, or belongs.
+  /// Returns the slot of the key, or the one to put it into.
   [[nodiscard]] std::size_t placeOf(Key key) const {
     Key scattered = key * 0x9e3779b97f4a7c15ULL;
     scattered ^= scattered >> 32;
@@ -80,7 +80,7 @@ class KeyMap {
   std::size_t count_ = 0;
 };
 
-/// Erases what `is_done` says, which is asked on all threads.
+/// Erases the values for which `is_done` is true; it is called on all threads.
 template <class T, class IsDone>
 void eraseAll(std::vector<T>& values, const IsDone& is_done) {
   std::vector<char> done(values.size());
@@ -98,7 +98,7 @@ void sortUnique(std::vector<T>& values) {
   values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
-/// The first of those with the same key.
+/// Sorts, and keeps the first of each key.
 template <class T>
 void sortUniqueKeys(std::vector<std::pair<Key, T>>& values) {
   tbb::parallel_sort(values.begin(), values.end());

@@ -1,6 +1,9 @@
-// A filling is blown up like a balloon, outwards where the number is above ½ and inwards where it
-// is below, and cut finer until the middles of its sides need not move. What a corner passes on its
-// way is on the right side afterwards wherever it stops.
+// A filling is inflated like a balloon: its corners move outwards where the number is above ½ and
+// inwards where it is below, and its sides are cut until their middles need not move. Wherever a
+// corner stops, everything it has passed is on the right side.
+//
+// Triangles of minimum area: Barequet, Sharir: "Filling gaps in the boundary of a polyhedron",
+// Computer Aided Geometric Design 12(2), 1995. The winding number: see winding_number.cpp.
 
 #include "ops/kernels/mesh/hole_filling.h"
 
@@ -28,11 +31,11 @@ namespace {
 
 using Triangle = Mesh::Triangle;
 
-/// Of the solid's volume, what the holes that are too small to be looked at may add up to, were
-/// they filled by half balls; and what the others may miss.
+/// As a share of the solid's volume: the maximum sum over holes that keep their fan unexamined,
+/// each counted as a half ball; and the maximum that the other fillings may miss.
 constexpr double volume_tolerance = 4e-4;
-constexpr int most_rounds = 10;
-constexpr std::size_t most_triangles = 50'000;
+constexpr int maximum_rounds = 10;
+constexpr std::size_t maximum_triangles = 50'000;
 
 double lengthOf(const Mesh& mesh, const HoleLoop& loop) {
   double length = 0;
@@ -65,28 +68,27 @@ Vec3d areaOf(const Mesh& mesh, const Triangle& t) {
   return 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
 }
 
-/// The triangles between the corners of a loop whose areas add up to the least (Barequet, Sharir:
-/// "Filling gaps in the boundary of a polyhedron", 1995), or a fan where there are too many
-/// corners.
-void fillWithLeastArea(Mesh& mesh, const HoleLoop& loop) {
+/// Fills a loop with the triangles between its corners that have the minimum area (Barequet, Sharir
+/// 1995), or with a fan if there are too many corners.
+void fillWithMinimumArea(Mesh& mesh, const HoleLoop& loop) {
   const std::size_t count = loop.size();
-  constexpr std::size_t most_corners = 500;
-  if (count > most_corners) return fillWithFan(mesh, loop);
+  constexpr std::size_t maximum_corners = 500;
+  if (count > maximum_corners) return fillWithFan(mesh, loop);
   struct Best {
     double area = 0;
     std::uint32_t corner = 0;
   };
-  std::vector<Best> best(count * count);  // of the corners from one to another, which have a side
+  std::vector<Best> best(count * count);  // by corners `from` and `to`: of those between them
   for (std::size_t span = 2; span < count; ++span)
     for (std::size_t from = 0; from + span < count; ++from) {
       const std::size_t to = from + span;
-      Best least{std::numeric_limits<double>::infinity()};
+      Best minimum{std::numeric_limits<double>::infinity()};
       for (std::size_t corner = from + 1; corner < to; ++corner) {
         const double area = best[from * count + corner].area + best[corner * count + to].area +
                             areaOf(mesh, {loop[from], loop[corner], loop[to]}).length();
-        if (area < least.area) least = {area, static_cast<std::uint32_t>(corner)};
+        if (area < minimum.area) minimum = {area, static_cast<std::uint32_t>(corner)};
       }
-      best[from * count + to] = least;
+      best[from * count + to] = minimum;
     }
   std::vector<std::pair<std::size_t, std::size_t>> sides{{0, count - 1}};
   while (!sides.empty()) {
@@ -99,49 +101,50 @@ void fillWithLeastArea(Mesh& mesh, const HoleLoop& loop) {
   }
 }
 
-/// Fillings of holes on their way to where the number is ½.
+/// Fillings of holes, while they are moved to where the number is ½.
 class Membranes {
  public:
   Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops, double miss_mm3);
 
-  /// Returns which of them are better than the fans they began as.
+  /// Moves the fillings. Returns which of them are better than a fan.
   std::vector<bool> bend();
 
-  /// Adds the triangles of one to the open mesh.
+  /// Adds the triangles of one filling to the open mesh.
   void addTo(Mesh& mesh, std::uint32_t hole) const;
 
  private:
-  /// A place that a corner may leave along a line.
+  /// A place from which a corner may move along a line.
   struct Place {
     Vec3d at, outwards;
     double reach_mm;
   };
   struct Way {
     Vec3d by;
-    bool leads_there;  ///< to where a filling should be, and not to a triangle or nowhere
+    bool
+        leads_there;  ///< whether it ends where the filling should be, not at a triangle or nowhere
   };
 
-  /// The way that a place of a filling should go, within reach.
+  /// Returns the way that a place of a filling should move, within its reach.
   [[nodiscard]] Way way(const Place& place) const;
   [[nodiscard]] std::vector<Way> ways(const std::vector<Place>& places) const;
   bool cut();
   [[nodiscard]] std::vector<double> misses() const;
 
   WindingNumber number_;
-  Mesh first_;  ///< the fillings before they were bent
+  Mesh first_;  ///< the fillings before they were moved
   std::optional<WindingNumber> first_number_;
-  Mesh mesh_;                        ///< of the fillings; the loops' corners come first
+  Mesh mesh_;                        ///< the fillings; the loops' corners come first
   std::vector<std::uint32_t> hole_;  ///< by triangle
   std::vector<std::uint32_t> open_;  ///< by corner of a loop: the open mesh's vertex
-  std::vector<bool> is_new_;         ///< by vertex: no side at it was looked at
+  std::vector<bool> is_new_;         ///< by vertex: its sides were not yet examined
   std::size_t holes_;
-  double miss_mm_;                   ///< what the middle of a side may be away
-  double least_mm3_;                 ///< what is not worth a cut
-  std::vector<double> of_fans_mm3_;  ///< by hole, what lay between a fan and where it should be
+  double miss_mm_;                   ///< the maximum distance of a side's middle from the surface
+  double minimum_mm3_;               ///< the minimum volume that is worth a cut
+  std::vector<double> of_fans_mm3_;  ///< by hole, the volume between the fan and the surface
 };
 
 Membranes::Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops, double miss_mm3)
-    : number_(open), holes_(loops.size()), least_mm3_(miss_mm3 / 1000) {
+    : number_(open), holes_(loops.size()), minimum_mm3_(miss_mm3 / 1000) {
   std::vector<HoleLoop> own;
   for (const HoleLoop* loop : loops) {
     HoleLoop& corners = own.emplace_back();
@@ -159,7 +162,7 @@ Membranes::Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops
       hole_.resize(mesh_.triangles.size(), hole);
     }
   };
-  fill(fillWithLeastArea);
+  fill(fillWithMinimumArea);
   first_ = mesh_;
   std::vector<std::uint32_t> first_hole = hole_;
   first_number_.emplace(first_);
@@ -171,16 +174,16 @@ Membranes::Membranes(const Mesh& open, const std::vector<const HoleLoop*>& loops
   is_new_.assign(mesh_.vertices.size(), true);
 }
 
-/// Outwards where the number is above ½, until it is not or the solid, as the fillings first made
-/// it, begins again; inwards where it is below, until it is not.
+/// Where the number is above ½, moves outwards until it is not, or until the solid that the first
+/// fillings close begins again; where it is below, moves inwards until it is not.
 Membranes::Way Membranes::way(const Place& place) const {
   constexpr int steps = 8;
   constexpr int narrowings = 8;
   constexpr double near_half = 2e-4;
   const double here = number_.closelyAt(place.at) - 0.5;
   const bool is_inside = here > 0;
-  // Where ½ is near the number itself tells the way to it. Between parts that cover one another's
-  // holes it hardly changes.
+  // Near ½ the gradient points the way. Between parts that cover each other's holes the number
+  // hardly changes.
   const Vec3d slope = number_.gradientAt(place.at);
   const double rise = slope.length();
   const bool is_near = std::abs(here) < std::min(0.5, place.reach_mm * rise);
@@ -196,7 +199,7 @@ Membranes::Way Membranes::way(const Place& place) const {
     const bool is_covered = is_inside && !is_near && number + first_number_->closelyAt(p) > 0.5;
     return Seen{t, number, (number > 0.5) != is_inside || is_covered};
   };
-  // On the filling itself its own number is anything.
+  // On the filling itself its own number is undefined.
   Seen low = look(1e-3);
   if (low.arrived) return {Vec3d(0.0), true};
   Seen high = low;
@@ -206,7 +209,7 @@ Membranes::Way Membranes::way(const Place& place) const {
   }
   if (!high.arrived) return {along, false};
   for (int narrowing = 0; narrowing < narrowings; ++narrowing) {
-    // Where ½ is passed without a triangle the number hardly bends.
+    // Where the number passes ½ without a triangle, it is almost linear.
     const bool is_passed = (high.number > 0.5) != is_inside;
     const double share =
         is_passed ? std::clamp((0.5 - low.number) / (high.number - low.number), 0.1, 0.9) : 0.5;
@@ -226,7 +229,7 @@ std::vector<Membranes::Way> Membranes::ways(const std::vector<Place>& places) co
   return made;
 }
 
-/// Cuts the sides whose middle is not where it should be. Returns whether there were any.
+/// Cuts the sides whose middle is too far from the surface. Returns whether there were any.
 bool Membranes::cut() {
   const MeshEdges edges(mesh_);
   std::vector<Place> places;
@@ -251,7 +254,7 @@ bool Membranes::cut() {
     for (const std::uint32_t half : edges.halves(looked_at[i]))
       area_mm2 += areaOf(mesh_, mesh_.triangles[half / 3]).length();
     const double miss_mm = made[i].by.length();
-    if (!made[i].leads_there || miss_mm <= miss_mm_ || miss_mm * area_mm2 < 3 * least_mm3_)
+    if (!made[i].leads_there || miss_mm <= miss_mm_ || miss_mm * area_mm2 < 3 * minimum_mm3_)
       continue;
     is_cut = true;
     for (const std::uint32_t half : edges.halves(looked_at[i]))
@@ -265,7 +268,7 @@ bool Membranes::cut() {
     Triangle t = mesh_.triangles[i];
     Triangle m{middle[3 * i], middle[3 * i + 1], middle[3 * i + 2]};
     const auto count = std::count_if(m.begin(), m.end(), [](std::uint32_t v) { return v != none; });
-    // Turned so that with one the first side is cut, with two the last is not.
+    // Rotated so that of one cut side it is the first, and of two the last is not cut.
     for (std::size_t turn = 0; turn < 2; ++turn)
       if ((count == 1 && m[0] == none) || (count == 2 && m[2] != none)) {
         std::rotate(t.begin(), t.begin() + 1, t.end());
@@ -293,7 +296,8 @@ bool Membranes::cut() {
   return is_cut;
 }
 
-/// By hole, what lies between the filling and where it should be, mm³, as far as triangles see.
+/// Returns by hole the volume between the filling and the surface, mm³, estimated at the triangles'
+/// middles.
 std::vector<double> Membranes::misses() const {
   std::vector<Place> places;
   for (const Triangle& t : mesh_.triangles) {
@@ -309,7 +313,8 @@ std::vector<double> Membranes::misses() const {
 }
 
 std::vector<bool> Membranes::bend() {
-  for (int round = 0; round < most_rounds && mesh_.triangles.size() < most_triangles; ++round) {
+  for (int round = 0; round < maximum_rounds && mesh_.triangles.size() < maximum_triangles;
+       ++round) {
     if (!cut()) break;
   }
   const std::vector<double> after = misses();
@@ -349,7 +354,7 @@ void fillWhereNumberIsHalf(Mesh& mesh, std::span<const HoleLoop> loops) {
   fillWithFans(fanned, loops);
   const double miss_mm3 = volume_tolerance * std::abs(volumeOf(fanned));
 
-  // The smallest are left alone as long as all of them together cannot matter.
+  // The smallest holes keep their fans, as long as the sum of all of them is too small to matter.
   std::vector<double> half_ball_mm3;
   for (const HoleLoop& loop : loops) {
     const double radius_mm = lengthOf(mesh, loop) / (2 * std::numbers::pi);

@@ -9,25 +9,24 @@
 
 namespace vdbdither {
 
-/// Corners of a hole, in the direction in which a triangle that closes it has them.
+/// The corners of a hole, in the direction of a triangle that closes it.
 using HoleLoop = std::vector<std::uint32_t>;
 
-/// Adds triangles that fill the holes of a mesh, hole by hole: a loop of three becomes a triangle,
-/// others a fan about their middle.
+/// Adds triangles that fill the holes of a mesh, hole by hole: a loop of three corners becomes a
+/// triangle, others a fan about their centre.
 void fillWithFans(Mesh& mesh, std::span<const HoleLoop> loops);
 
-/// The same, but where a fan would miss the surface on which the generalized winding number of the
-/// open mesh (Jacobson, Kavan, Sorkine-Hornung, "Robust inside-outside segmentation using
-/// generalized winding numbers", 2013) is one half, it is cut into smaller triangles whose inner
-/// corners lie on that surface. Sides of `loops` are never cut. Where the number is above one half
-/// before the hole until another part begins, as between two halves that hardly touch, the filling
-/// reaches into that part.
+/// Fills holes along the surface on which the generalized winding number of the open mesh (Jacobson
+/// et al. 2013) is one half: a fan that would miss this surface is cut into smaller triangles whose
+/// inner corners lie on it. Sides of `loops` are never cut. Where the number stays above one half
+/// from the hole up to another part, as between two halves that hardly touch, the filling reaches
+/// into that part.
 ///
-/// What is left between fillings and surface comes to less than a thousandth of the solid's volume,
-/// mostly far less. Holes that are too small to matter, flat or within the solid keep their fan,
-/// and so do those whose fan cannot be bettered. The same bits for any number of threads.
+/// The volume between fillings and surface is less than a thousandth of the solid's, mostly far
+/// less. Holes that are too small to matter, flat or within the solid keep their fan, and so do
+/// those whose fan cannot be improved. The result is the same for any number of threads.
 ///
-/// `mesh` in mm, faces outwards; without the loops' sides it would be closed.
+/// `mesh` in mm, facing outwards, and closed except at the loops.
 void fillWhereNumberIsHalf(Mesh& mesh, std::span<const HoleLoop> loops);
 
 }  // namespace vdbdither

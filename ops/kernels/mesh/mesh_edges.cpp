@@ -7,7 +7,7 @@ namespace vdbdither {
 
 namespace {
 
-/// Few vertices have more edges than a handful.
+/// Sorts in place; most vertices have only a few edges.
 void sortFew(std::uint64_t* begin, std::uint64_t* end) {
   constexpr std::ptrdiff_t few = 24;
   if (end - begin > few) return std::sort(begin, end);
@@ -22,7 +22,8 @@ void sortFew(std::uint64_t* begin, std::uint64_t* end) {
 }  // namespace
 
 MeshEdges::MeshEdges(const Mesh& mesh, std::size_t triangles) {
-  // By the lower end of a side: its other end and its half-edge, to sort by both.
+  // For each vertex that is the lower end of a side: the other end and the half-edge, packed to be
+  // sorted by both.
   const std::span some(mesh.triangles.data(), triangles);
   const auto forEachSide = [&some](const auto& work) {
     std::uint64_t half = 0;

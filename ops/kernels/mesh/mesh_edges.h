@@ -9,22 +9,22 @@
 
 namespace vdbdither {
 
-/// The edges of a mesh and the sides of triangles that lie on them. Half-edge h is the side of
-/// triangle h / 3 that starts at its corner h % 3. Sides from a vertex to itself are left out.
+/// The edges of a mesh and the sides of triangles on them. Half-edge h is the side of triangle h /
+/// 3 that starts at its corner h % 3. Sides from a vertex to itself are left out.
 class MeshEdges {
  public:
   struct Edge {
     std::uint32_t from = 0, to = 0;  ///< from < to
-    std::uint32_t first = 0;         ///< where its half-edges begin
+    std::uint32_t first = 0;         ///< of its half-edges, in halves_
   };
 
   explicit MeshEdges(const Mesh& mesh) : MeshEdges(mesh, mesh.triangles.size()) {}
-  /// Of the first `triangles` triangles alone.
+  /// Uses only the first `triangles` triangles.
   MeshEdges(const Mesh& mesh, std::size_t triangles);
 
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(edges_.size() - 1); }
   [[nodiscard]] const Edge& operator[](std::uint32_t edge) const { return edges_[edge]; }
-  /// In rising order.
+  /// The half-edges of an edge, in rising order.
   [[nodiscard]] std::span<const std::uint32_t> halves(std::uint32_t edge) const {
     return {halves_.data() + edges_[edge].first, edges_[edge + 1].first - edges_[edge].first};
   }
@@ -34,7 +34,7 @@ class MeshEdges {
   }
 
  private:
-  std::vector<Edge> edges_;  ///< one more than there are, to end the last; sorted by from, to
+  std::vector<Edge> edges_;  ///< sorted by `from`, then `to`; one more entry ends the last edge
   std::vector<std::uint32_t> halves_;
 };
 

@@ -1,16 +1,20 @@
 #include "ops/kernels/mesh/mesh_measures.h"
 
+#include <optional>
+
 namespace vdbdither {
 
 using openvdb::Vec3d;
 
-MeshBounds boundsOf(const Mesh& mesh) {
-  MeshBounds bounds{mesh.vertices.front(), mesh.vertices.front()};
-  for (const Vec3d& vertex : mesh.vertices) {
-    bounds.min = openvdb::math::minComponent(bounds.min, vertex);
-    bounds.max = openvdb::math::maxComponent(bounds.max, vertex);
-  }
-  return bounds;
+MeshBounds boundsOf(std::span<const Mesh> meshes) {
+  std::optional<MeshBounds> bounds;
+  for (const Mesh& mesh : meshes)
+    for (const Vec3d& vertex : mesh.vertices) {
+      if (!bounds) bounds = {vertex, vertex};
+      bounds->min = openvdb::math::minComponent(bounds->min, vertex);
+      bounds->max = openvdb::math::maxComponent(bounds->max, vertex);
+    }
+  return bounds.value();
 }
 
 double areaOf(const Mesh& mesh) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include <openvdb/math/Vec3.h>
 
 #include "vdbdither/model/mesh.h"
@@ -11,8 +13,9 @@ struct MeshBounds {
   openvdb::Vec3d min, max;
 };
 
-/// Bounds of all vertices. `mesh` must have a vertex.
-MeshBounds boundsOf(const Mesh& mesh);
+/// Returns the bounds of all vertices, of which there must be one.
+MeshBounds boundsOf(std::span<const Mesh> meshes);
+inline MeshBounds boundsOf(const Mesh& mesh) { return boundsOf(std::span(&mesh, 1)); }
 
 /// Returns the area of all triangles, mm².
 double areaOf(const Mesh& mesh);
@@ -20,8 +23,8 @@ double areaOf(const Mesh& mesh);
 /// Returns the enclosed volume, mm³; positive where the triangles face outwards.
 double volumeOf(const Mesh& mesh);
 
-/// Returns the share of one triangle in that volume: mm³ between it and the point `from`, which
-/// must be the same for all triangles.
+/// Returns the share of one triangle in that volume, mm³: the signed volume between it and the
+/// point `from`, which must be the same for all triangles.
 inline double volumeFrom(const openvdb::Vec3d& from, const Mesh& mesh, const Mesh::Triangle& t) {
   const openvdb::Vec3d a = mesh.vertices[t[0]] - from;
   const openvdb::Vec3d b = mesh.vertices[t[1]] - from;

@@ -47,20 +47,22 @@ Mesh joined(std::vector<Mesh> meshes) {
 
 Vec3d bedCornerMm(const Lattice& lattice) { return lattice.origin_mm - 0.5 * lattice.pitch_mm; }
 
-double place(Mesh& mesh, const MeshPlacement& placement) {
+double place(std::span<Mesh> meshes, const MeshPlacement& placement) {
   double factor = placement.factor;
-  rotate(mesh, placement.rotate_degrees);
+  for (Mesh& mesh : meshes) rotate(mesh, placement.rotate_degrees);
   if (placement.fit_mm > 0) {
-    const MeshBounds bounds = boundsOf(mesh);
+    const MeshBounds bounds = boundsOf(meshes);
     const Vec3d extent = bounds.max - bounds.min;
     const double longest = std::max({extent.x(), extent.y(), extent.z()});
     if (!(longest > 0)) throw DataError("--fit: the mesh has no extent");
     factor = placement.fit_mm / longest;
   }
-  for (Vec3d& vertex : mesh.vertices) vertex *= factor;
+  for (Mesh& mesh : meshes)
+    for (Vec3d& vertex : mesh.vertices) vertex *= factor;
   if (placement.corner_mm) {
-    const Vec3d move_mm = *placement.corner_mm - boundsOf(mesh).min;
-    for (Vec3d& vertex : mesh.vertices) vertex += move_mm;
+    const Vec3d move_mm = *placement.corner_mm - boundsOf(meshes).min;
+    for (Mesh& mesh : meshes)
+      for (Vec3d& vertex : mesh.vertices) vertex += move_mm;
   }
   return factor;
 }

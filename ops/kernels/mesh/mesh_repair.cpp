@@ -1,5 +1,5 @@
-// Whatever the triangles are, the sides that nothing meets from the other side form closed loops.
-// Filling these makes the mesh a cycle, for which the winding number is whole.
+// In any set of triangles the sides that no opposite side meets form closed loops. Filling the
+// loops makes the mesh a cycle, whose winding number is a whole number everywhere.
 
 #include "ops/kernels/mesh/mesh_repair.h"
 
@@ -29,16 +29,21 @@ constexpr double weld_mm = 1e-3;
 
 using Triangle = Mesh::Triangle;
 
-/// Renumbers the corners and drops the triangles that lost one.
-void renumber(Mesh& mesh, const std::vector<std::uint32_t>& to, MeshRepairs& repairs) {
-  for (Triangle& t : mesh.triangles)
+/// Renumbers the corners and drops the triangles of which two became the same.
+void renumber(DerivedMesh& made, const std::vector<std::uint32_t>& to, MeshRepairs& repairs) {
+  std::vector<Triangle>& triangles = made.mesh.triangles;
+  for (Triangle& t : triangles)
     for (std::uint32_t& v : t) v = to[v];
-  repairs.degenerate_triangles += std::erase_if(mesh.triangles, [](const Triangle& t) {
+  const std::size_t before = triangles.size();
+  dropTriangles(made, [&triangles](std::uint32_t i) {
+    const Triangle& t = triangles[i];
     return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
   });
+  repairs.degenerate_triangles += before - triangles.size();
 }
 
-void weldEqual(Mesh& mesh, MeshRepairs& repairs) {
+void weldEqual(DerivedMesh& made, MeshRepairs& repairs) {
+  const Mesh& mesh = made.mesh;
   std::vector<std::uint32_t> order(mesh.vertices.size());
   std::iota(order.begin(), order.end(), 0U);
   const auto key = [&](std::uint32_t v) {
@@ -51,10 +56,10 @@ void weldEqual(Mesh& mesh, MeshRepairs& repairs) {
   std::vector<std::uint32_t> to(order.size());
   for (std::size_t i = 0; i < order.size(); ++i)
     to[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? to[order[i - 1]] : order[i];
-  renumber(mesh, to, repairs);
+  renumber(made, to, repairs);
 }
 
-/// Directed sides that no opposite one cancels, each with its surplus.
+/// A directed side that opposite sides do not cancel, and its surplus.
 struct Border {
   std::uint32_t from, to;
   int count;
@@ -72,7 +77,8 @@ std::vector<Border> bordersOf(const Mesh& mesh, const MeshEdges& edges) {
 }
 
 /// Merges the vertices of open edges that lie within `weld_mm` of an earlier one.
-void weldBorders(Mesh& mesh, MeshRepairs& repairs) {
+void weldBorders(DerivedMesh& made, MeshRepairs& repairs) {
+  const Mesh& mesh = made.mesh;
   const MeshEdges edges(mesh);
   std::vector<std::uint32_t> open;
   for (std::uint32_t e = 0; e < edges.size(); ++e)
@@ -108,13 +114,14 @@ void weldBorders(Mesh& mesh, MeshRepairs& repairs) {
       ++repairs.welded_vertices;
     }
   }
-  if (repairs.welded_vertices > 0) renumber(mesh, to, repairs);
+  if (repairs.welded_vertices > 0) renumber(made, to, repairs);
 }
 
 /// Of triangles with the same corners one stays. Two that face opposite ways are a wall between two
-/// solids and both go, unless most of the mesh is like that: then it is a surface with two sides,
-/// and one stays.
-void dropDuplicates(Mesh& mesh, MeshRepairs& repairs) {
+/// solids; both are dropped, unless most of the mesh consists of such pairs: then it is a two-sided
+/// surface, and one of each pair stays.
+void dropDuplicates(DerivedMesh& made, MeshRepairs& repairs) {
+  const Mesh& mesh = made.mesh;
   struct Corners {
     Triangle sorted;
     std::uint32_t triangle;
@@ -147,14 +154,13 @@ void dropDuplicates(Mesh& mesh, MeshRepairs& repairs) {
   }
   if (4 * walls.size() < mesh.triangles.size())
     for (const std::uint32_t wall : walls) drop[wall] = true;
-  std::vector<Triangle> left;
-  for (std::size_t i = 0; i < drop.size(); ++i)
-    if (!drop[i]) left.push_back(mesh.triangles[i]);
-  repairs.duplicate_triangles += mesh.triangles.size() - left.size();
-  mesh.triangles = std::move(left);
+  const std::size_t before = drop.size();
+  dropTriangles(made, [&drop](std::uint32_t i) { return drop[i]; });
+  repairs.duplicate_triangles += before - mesh.triangles.size();
 }
 
-/// Turns triangles to agree across the edges where two meet. Returns the part of every triangle.
+/// Turns triangles to agree across the edges at which two meet. Returns the part of every triangle:
+/// those connected by such edges.
 std::vector<std::uint32_t> orient(Mesh& mesh, MeshRepairs& repairs) {
   const MeshEdges edges(mesh);
   const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
@@ -238,10 +244,10 @@ void turnInsideOut(Mesh& mesh, const std::vector<std::uint32_t>& part, MeshRepai
   }
 }
 
-/// The loops that the borders form, taken apart wherever they touch themselves.
+/// Returns the loops of the borders, split wherever they touch themselves.
 std::vector<HoleLoop> holesOf(const Mesh& mesh, MeshRepairs& repairs) {
   std::vector<HoleLoop> loops;
-  std::map<std::uint32_t, std::vector<std::uint32_t>> next;  // against the borders
+  std::map<std::uint32_t, std::vector<std::uint32_t>> next;  // directed against the borders
   for (const Border& border : bordersOf(mesh, MeshEdges(mesh))) {
     repairs.boundary_edges += static_cast<std::uint64_t>(border.count);
     next[border.to].insert(next[border.to].end(), static_cast<std::size_t>(border.count),
@@ -308,20 +314,21 @@ std::vector<std::string> MeshRepairs::lines() const {
   return lines;
 }
 
-Mesh repaired(Mesh mesh, MeshRepairs& repairs) {
-  weldEqual(mesh, repairs);
-  weldBorders(mesh, repairs);
-  dropDuplicates(mesh, repairs);
-  const std::vector<std::uint32_t> part = orient(mesh, repairs);
-  turnInsideOut(mesh, part, repairs);
-  closeHoles(mesh, repairs);
-  return mesh;
+DerivedMesh repaired(DerivedMesh triangles, MeshRepairs& repairs) {
+  weldEqual(triangles, repairs);
+  weldBorders(triangles, repairs);
+  dropDuplicates(triangles, repairs);
+  const std::vector<std::uint32_t> part = orient(triangles.mesh, repairs);
+  turnInsideOut(triangles.mesh, part, repairs);
+  closeHoles(triangles.mesh, repairs);
+  triangles.source.resize(triangles.mesh.triangles.size(), no_source);
+  return triangles;
 }
 
-Mesh withoutDuplicates(Mesh mesh, MeshRepairs& repairs) {
-  weldEqual(mesh, repairs);
-  dropDuplicates(mesh, repairs);
-  return mesh;
+DerivedMesh withoutDuplicates(DerivedMesh triangles, MeshRepairs& repairs) {
+  weldEqual(triangles, repairs);
+  dropDuplicates(triangles, repairs);
+  return triangles;
 }
 
 }  // namespace vdbdither

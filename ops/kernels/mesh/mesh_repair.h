@@ -4,30 +4,30 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/model/mesh.h"
+#include "ops/kernels/mesh/derived_mesh.h"
 
 namespace vdbdither {
 
-/// What was done to a mesh, by kind; all zero for a mesh that needed nothing.
+/// Counts of the repairs of a mesh; all zero for a mesh that needs none.
 struct MeshRepairs {
-  std::uint64_t welded_vertices = 0;       ///< merged with another within a micrometre, at a border
+  std::uint64_t welded_vertices = 0;       ///< merged with another within a micrometre, at borders
   std::uint64_t degenerate_triangles = 0;  ///< dropped: two corners are one
   std::uint64_t duplicate_triangles = 0;  ///< dropped: the same corners as another, or its opposite
   std::uint64_t flipped_triangles = 0;    ///< turned to agree with their neighbours
   std::uint64_t turned_parts = 0;         ///< parts that were inside out
-  std::uint64_t boundary_edges = 0;       ///< sides that no triangle met from the other side
-  std::uint64_t closed_holes = 0;         ///< loops of them that were filled
-  std::uint64_t filling_triangles = 0;    ///< what they were filled with: the last of the mesh
-  std::uint64_t swallowed_triangles = 0;  ///< left out of the surface: wholly within the solid
-  std::uint64_t cut_triangles = 0;        ///< left out in part
+  std::uint64_t boundary_edges = 0;       ///< sides that no opposite side meets
+  std::uint64_t closed_holes = 0;         ///< loops of boundary edges that were filled
+  std::uint64_t filling_triangles = 0;    ///< in the fillings; they are the last of the mesh
+  std::uint64_t swallowed_triangles = 0;  ///< not surface: wholly within the solid
+  std::uint64_t cut_triangles = 0;        ///< partly within the solid
 
-  /// Whether more than half of the sides were open: then what fills the holes is a guess at
-  /// nothing. `triangles`: of the repaired mesh.
+  /// Whether more than half of the sides were open, so that fillings say nothing about the solid.
+  /// `triangles` is the number in the repaired mesh.
   [[nodiscard]] bool areOfLooseTriangles(std::size_t triangles) const {
     return 2 * boundary_edges > 3 * (triangles - filling_triangles);
   }
 
-  /// One line for each kind that occurred.
+  /// Returns one line for each kind of repair that occurred.
   [[nodiscard]] std::vector<std::string> lines() const;
 };
 
@@ -35,18 +35,18 @@ struct MeshRepairs {
 /// that the winding number is a whole number everywhere, and positive within parts that are not
 /// cavities.
 ///
-/// Vertices at the same position become one (that is not counted as a repair: file formats without
+/// Vertices at the same position become one (this does not count as a repair: file formats without
 /// shared vertices need it); at borders also those within a micrometre. Degenerate and duplicate
-/// triangles go. Triangles are turned to agree with their neighbours, parts that are inside out and
-/// in no other part are turned, and loops of borders are filled; see hole_filling.h. Deterministic;
-/// the order of the triangles that stay is kept, and so are all vertices, behind which those of
-/// fillings come.
+/// triangles are dropped. Triangles are turned to agree with their neighbours, parts that are
+/// inside out and in no other part are turned, and loops of borders are filled; see hole_filling.h.
+/// Triangles keep their order and their sources, those of fillings come last and have none. All
+/// vertices stay, new ones come last. Deterministic.
 ///
-/// `mesh` in mm.
-Mesh repaired(Mesh mesh, MeshRepairs& repairs);
+/// `triangles` in mm.
+DerivedMesh repaired(DerivedMesh triangles, MeshRepairs& repairs);
 
 /// The first steps of `repaired` alone: vertices at the same position become one, and degenerate
-/// and duplicate triangles go.
-Mesh withoutDuplicates(Mesh mesh, MeshRepairs& repairs);
+/// and duplicate triangles are dropped.
+DerivedMesh withoutDuplicates(DerivedMesh triangles, MeshRepairs& repairs);
 
 }  // namespace vdbdither

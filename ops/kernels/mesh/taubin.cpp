@@ -1,3 +1,5 @@
+// Taubin: "A Signal Processing Approach to Fair Surface Design", SIGGRAPH 1995.
+
 #include "ops/kernels/mesh/taubin.h"
 
 #include <cstddef>
@@ -15,7 +17,7 @@ namespace {
 
 /// The neighbours of every vertex, in the order of the triangles.
 struct Neighbours {
-  std::vector<std::uint32_t> first;  ///< by vertex, and the end of the last
+  std::vector<std::uint32_t> first;  ///< by vertex; one more entry ends the last
   std::vector<std::uint32_t> vertices;
 
   explicit Neighbours(const Mesh& mesh)

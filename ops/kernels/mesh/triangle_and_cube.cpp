@@ -1,3 +1,5 @@
+// Akenine-Möller: "Fast 3D triangle-box overlap testing", Journal of Graphics Tools 6(1), 2001.
+
 #include "ops/kernels/mesh/triangle_and_cube.h"
 
 #include <algorithm>
@@ -7,8 +9,8 @@ namespace vdbdither {
 
 using openvdb::Vec3d;
 
-/// No axis parts them: of the cube's, along the normal, or across a side in one of the planes
-/// between the cube's.
+/// They meet if no axis separates them: one of the cube's, the triangle's normal, or the cross
+/// product of a side and a cube's axis.
 bool meetsCube(const std::array<Vec3d, 3>& triangle, const Vec3d& middle, double half) {
   half *= 1 + 1e-6;
   const std::array<Vec3d, 3> at{triangle[0] - middle, triangle[1] - middle, triangle[2] - middle};

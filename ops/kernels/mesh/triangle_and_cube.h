@@ -6,8 +6,8 @@
 
 namespace vdbdither {
 
-/// Whether a triangle meets the cube that reaches `half` from its middle along each axis, or nearly
-/// (Akenine-Möller: "Fast 3D triangle-box overlap testing", 2001).
+/// Whether a triangle meets, or nearly meets, the cube that reaches `half` from `middle` along each
+/// axis (Akenine-Möller 2001).
 bool meetsCube(const std::array<openvdb::Vec3d, 3>& triangle, const openvdb::Vec3d& middle,
                double half);
 

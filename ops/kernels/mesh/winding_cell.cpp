@@ -10,7 +10,7 @@ using openvdb::Vec3d;
 
 namespace {
 
-/// Triangles that come as near to the cube as this many of its edges count one by one.
+/// Triangles within this many edges of the cube count one by one.
 constexpr double near_edges = 1.5;
 
 }  // namespace

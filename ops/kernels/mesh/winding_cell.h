@@ -11,26 +11,28 @@
 
 namespace vdbdither {
 
-/// The generalized winding number within a cube, for many places in it: of triangles near the cube
-/// one by one, of all others a polynomial that has their number and its gradient at the cube's
-/// corners (of the third degree and some terms of the fourth and fifth; in the plane, Adini's
-/// rectangle). Within 0.002 of WindingNumber::closelyAt, mostly within 0.0001.
+/// The generalized winding number within a cube, for many places in it. Triangles near the cube are
+/// summed one by one; all others are represented by a polynomial that has their number and gradient
+/// at the cube's corners (third degree with some terms of the fourth and fifth; in the plane,
+/// Adini's rectangle). Differs from WindingNumber::closelyAt by at most 0.002, mostly by less than
+/// 0.0001.
 class WindingCell {
  public:
-  /// What WindingNumber says at a corner.
+  /// The number at a corner, as WindingNumber gives it.
   struct Corner {
     double number = 0;
     openvdb::Vec3d gradient{0.0};  ///< per mm
   };
 
   WindingCell() = default;
-  /// The cube from `low`. Corner n lies at its upper end along x where n & 1, y: n & 2, z: n & 4.
+  /// The cube with its lowest corner at `low`. Corner n lies at the upper end along x if n & 1,
+  /// along y if n & 2, along z if n & 4.
   WindingCell(const Mesh& mesh, const WindingNumber& winding, const openvdb::Vec3d& low,
               double edge_mm, const std::array<Corner, 8>& corners);
 
-  /// The number at p. `mesh`: the one it was made for.
+  /// Returns the number at p. `mesh` must be the one that the cell was made for.
   [[nodiscard]] double at(const Mesh& mesh, const openvdb::Vec3d& p) const;
-  /// How it rises there, per mm; nearly.
+  /// Returns about the gradient at p, per mm.
   [[nodiscard]] openvdb::Vec3d gradientAt(const Mesh& mesh, const openvdb::Vec3d& p) const;
 
  private:

@@ -14,7 +14,7 @@ WindingCells::WindingCells(const Mesh& mesh, const openvdb::math::BBox<Vec3d>& b
       winding_(mesh),
       longest_mm_(bounds.extents()[static_cast<int>(bounds.maxExtent())]),
       unit_mm_(longest_mm_ / along_longest / units),
-      // A part of a cell that keeps corners out of planes which designers like.
+      // Offsets that keep corners out of the planes that designs often use.
       origin_mm_(bounds.min() - units * unit_mm_ * Vec3d(0.3819, 0.4142, 0.3028)),
       limits_(Coord::floor((bounds.min() - 0.5 * longest_mm_ - origin_mm_) / unit_mm_),
               Coord::ceil((bounds.max() + 0.5 * longest_mm_ - origin_mm_) / unit_mm_)) {}

@@ -15,7 +15,7 @@
 namespace vdbdither {
 
 /// The generalized winding number of a mesh in a grid of cells, 64 along the longest side of its
-/// bounding box. Places on the grid are in units, so many of which make the edge of a cell.
+/// bounding box. Places on the grid are counted in units; the edge of a cell is `units` long.
 class WindingCells {
  public:
   static constexpr double along_longest = 64;
@@ -24,31 +24,31 @@ class WindingCells {
   /// The mesh must outlive the cells; `bounds` is its bounding box.
   WindingCells(const Mesh& mesh, const openvdb::math::BBox<openvdb::Vec3d>& bounds);
 
-  /// The cells whose lowest corners these are; those that are not there yet are made.
+  /// Returns the cells with these lowest corners, which it makes if they do not exist.
   std::vector<std::uint32_t> at(const std::vector<openvdb::Coord>& lows);
 
-  /// The number at a place in a cell.
+  /// Returns the number at a place in a cell.
   [[nodiscard]] double numberAt(std::uint32_t cell, const openvdb::Vec3d& p) const {
     return cells_[cell].at(mesh_, p);
   }
-  /// The same, but on the side of ½ and −½ on which it is.
+  /// Returns a number on the right side of ½ and −½.
   [[nodiscard]] double judgedAt(std::uint32_t cell, const openvdb::Vec3d& p) const {
     constexpr double doubt = 1e-3;
     const double number = numberAt(cell, p);
     return std::abs(std::abs(number) - 0.5) < doubt ? winding_.judgedAt(p) : number;
   }
-  /// How it rises there, per mm; nearly.
+  /// Returns about the gradient at a place in a cell, per mm.
   [[nodiscard]] openvdb::Vec3d gradientAt(std::uint32_t cell, const openvdb::Vec3d& p) const {
     return cells_[cell].gradientAt(mesh_, p);
   }
   [[nodiscard]] const Mesh& mesh() const { return mesh_; }
   [[nodiscard]] double longestMm() const { return longest_mm_; }
   [[nodiscard]] double unitMm() const { return unit_mm_; }
-  /// Of a place on the grid, mm.
+  /// Returns the position of a place on the grid, mm.
   [[nodiscard]] openvdb::Vec3d position(const openvdb::Coord& corner) const {
     return origin_mm_ + corner.asVec3d() * unit_mm_;
   }
-  /// Places farther out count as outside.
+  /// The places on the grid beyond which everything counts as outside.
   [[nodiscard]] const openvdb::CoordBBox& limits() const { return limits_; }
 
  private:

@@ -1,3 +1,10 @@
+// The solid angle of a triangle: van Oosterom, Strackee: "The Solid Angle of a Plane Triangle",
+// IEEE Transactions on Biomedical Engineering 30(2), 1983. The winding number: Jacobson, Kavan,
+// Sorkine-Hornung: "Robust inside-outside segmentation using generalized winding numbers", ACM
+// Transactions on Graphics 32(4), 2013. Groups of triangles: Barill, Dickson, Schmidt, Levin,
+// Jacobson: "Fast winding numbers for soups and clouds", ACM Transactions on Graphics 37(4),
+// 2018.
+
 #include "ops/kernels/mesh/winding_number.h"
 
 #include <algorithm>
@@ -13,7 +20,7 @@ namespace {
 
 constexpr std::uint32_t triangles_per_leaf = 8;
 
-/// Nearer to ½ than this a number is asked for again, more accurately.
+/// A number nearer to ½ than this is computed again, more accurately.
 constexpr double rough_doubt = 0.01;
 constexpr double close_doubt = 0.0005;
 
@@ -33,7 +40,7 @@ HalfAngle halfAngle(const std::array<Vec3d, 3>& corners, const Vec3d& p) {
   return {la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb, a.dot(b.cross(c))};
 }
 
-/// A sum of half angles: their product and how often its argument passed π.
+/// A sum of half angles: their product, and how often its argument has passed π.
 class HalfAngleSum {
  public:
   void add(const HalfAngle& half) {
@@ -218,8 +225,8 @@ void WindingNumber::forEach(const Vec3d& p, double far_radii, const Far& far,
   }
 }
 
-/// Of a group: the field of a dipole, a·r / r³ with r from the point to the group's centre, and
-/// what its first and second derivatives add, contracted with the moments.
+/// A group adds the field of a dipole, a·r / r³ with r from the point to the group's centre, and
+/// its first and second derivatives, contracted with the moments.
 double WindingNumber::sum(const Vec3d& p, double far_radii) const {
   double sum = 0;
   const auto far = [&sum](const Node& node, const Vec3d& r) {
@@ -247,7 +254,7 @@ double WindingNumber::sum(const Vec3d& p, double far_radii) const {
   return number + sum / (4 * std::numbers::pi);
 }
 
-/// Of a group the derivative of what is summed for the number.
+/// A group adds the derivative of its terms in the number.
 Vec3d WindingNumber::gradientAt(const Vec3d& p) const {
   Vec3d sum(0.0);
   const auto far = [&sum](const Node& node, const Vec3d& r) {

@@ -12,13 +12,14 @@
 
 namespace vdbdither {
 
-/// The solid angle of a triangle seen from p, positive where its corners turn clockwise there: from
-/// the inside of a solid whose triangles are counter-clockwise seen from outside (van Oosterom and
-/// Strackee 1983). Zero in the triangle's plane.
+/// Returns the solid angle of a triangle seen from p (van Oosterom and Strackee 1983): positive
+/// where its corners turn clockwise, as seen from inside a solid whose triangles are
+/// counter-clockwise from outside; zero in the triangle's plane.
 double solidAngle(const std::array<openvdb::Vec3d, 3>& corners, const openvdb::Vec3d& p);
 
-/// The generalized winding number of some triangles of a mesh, one by one, and how it rises at p
-/// per mm (as currents along the triangles' sides make a magnetic field). `p` is on no side of one.
+/// The generalized winding number of some triangles of a mesh, summed one by one, and its gradient
+/// at p per mm (the magnetic field of currents along the triangles' sides). `p` must not lie on a
+/// side.
 double windingOf(const Mesh& mesh, std::span<const std::uint32_t> triangles,
                  const openvdb::Vec3d& p);
 openvdb::Vec3d windingGradientOf(const Mesh& mesh, std::span<const std::uint32_t> triangles,
@@ -33,26 +34,27 @@ inline std::array<openvdb::Vec3d, 3> cornersOf(const Mesh& mesh, std::uint32_t t
 /// 1 inside a closed surface and 0 outside, ½ on it; fractions where it is open.
 ///
 /// Groups of triangles far from a point count as a dipole with its first and second derivatives
-/// (Barill et al., "Fast winding numbers for soups and clouds", 2018), near ones one by one.
+/// (Barill et al. 2018); near triangles count one by one.
 class WindingNumber {
  public:
-  /// `mesh` is kept by reference.
+  /// Keeps a reference to `mesh`.
   explicit WindingNumber(const Mesh& mesh);
 
-  /// From every triangle, in double.
+  /// Sums over every triangle, in double precision.
   [[nodiscard]] double exactAt(const openvdb::Vec3d& p) const;
 
-  /// Within 0.01 of the exact number, mostly within 0.001.
+  /// Returns the number to within 0.01, mostly within 0.001.
   [[nodiscard]] double at(const openvdb::Vec3d& p) const { return sum(p, rough_radii); }
 
-  /// Within 0.0005 of the exact number, mostly within 0.0001.
+  /// Returns the number to within 0.0005, mostly within 0.0001.
   [[nodiscard]] double closelyAt(const openvdb::Vec3d& p) const { return sum(p, close_radii); }
 
-  /// How it rises at p, per mm, mostly within some thousandths. `p` is on no side of a triangle.
+  /// Returns the gradient at p per mm, mostly to within some thousandths. `p` must not lie on a
+  /// side of a triangle.
   [[nodiscard]] openvdb::Vec3d gradientAt(const openvdb::Vec3d& p) const;
 
-  /// Calls work(triangle) for all that come within `distance_mm` of p, and some others, in an order
-  /// that depends on the mesh alone.
+  /// Calls work(triangle) for all triangles within `distance_mm` of p and for some others, in an
+  /// order that depends on the mesh alone.
   template <class Work>
   void forEachWithin(const openvdb::Vec3d& p, double distance_mm, const Work& work) const {
     std::vector<std::uint32_t> waiting;
@@ -71,24 +73,26 @@ class WindingNumber {
     }
   }
 
-  /// On the side of ½, and of −½, on which the exact number is; as near to it as that takes.
+  /// Returns a number on the same side of ½ and of −½ as the exact number, computed only as
+  /// accurately as this needs.
   [[nodiscard]] double judgedAt(const openvdb::Vec3d& p) const;
 
  private:
-  /// From how many radii a group counts as one.
+  /// The distance, in radii, from which a group counts as a dipole.
   static constexpr double rough_radii = 2;
   static constexpr double close_radii = 4;
 
-  /// Moments of its triangles' vector areas a about the centre, x being the place of each.
+  /// Moments of the vector areas a of a group's triangles about its centre; x is the place of each.
   struct Node {
     openvdb::Vec3d centre;          ///< by area
     openvdb::Vec3d area;            ///< ∑ a
     std::array<double, 6> first;    ///< ∑ a xᵀ, made symmetric: xx yy zz xy xz yz
     openvdb::Vec3d second_trace;    ///< ∑ 2 (a·x) x + (x·x) a
     std::array<double, 10> second;  ///< ∑ a x x, symmetric: xxx yyy zzz xxy xxz yyx yyz zzx zzy xyz
-    double radius;                  ///< of what the triangles take about the centre
+    double radius;                  ///< of a sphere about the centre that holds the triangles
     std::uint32_t begin, end;       ///< of `order_`
-    std::uint32_t other;            ///< the other half's node, the first follows; 0 for a leaf
+    std::uint32_t
+        other;  ///< the node of the second half; that of the first half follows; 0 for a leaf
   };
 
   [[nodiscard]] std::array<openvdb::Vec3d, 3> corners(std::uint32_t triangle) const {
@@ -99,14 +103,14 @@ class WindingNumber {
   }
   [[nodiscard]] Node nodeOf(std::uint32_t begin, std::uint32_t end) const;
   std::uint32_t build(std::uint32_t begin, std::uint32_t end);
-  /// Calls far(node, r), r from p to its centre, for groups that count as one, and near(node)
-  /// for leaves that do not.
+  /// Calls far(node, r), with r from p to the centre, for groups that count as a dipole, and
+  /// near(node) for leaves that do not.
   template <class Far, class Near>
   void forEach(const openvdb::Vec3d& p, double far_radii, const Far& far, const Near& near) const;
   [[nodiscard]] double sum(const openvdb::Vec3d& p, double far_radii) const;
 
   const Mesh& mesh_;
-  std::vector<openvdb::Vec3d> middles_;  ///< of the triangles, while it is built
+  std::vector<openvdb::Vec3d> middles_;  ///< of the triangles, while the tree is built
   std::vector<std::uint32_t> order_;
   std::vector<Node> nodes_;
 };

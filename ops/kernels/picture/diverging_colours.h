@@ -7,9 +7,9 @@
 
 namespace vdbdither {
 
-/// The sRGB colour of `value` between −1 (blue), 0 (light grey) and 1 (red), straight between the
-/// ends and the middle of Moreland's "Diverging Color Maps for Scientific Visualization", 2009.
-/// Values beyond get the end's colour.
+/// Returns the sRGB colour of `value` between −1 (blue), 0 (light grey) and 1 (red), interpolated
+/// linearly between the ends and the middle of Moreland's "Diverging Color Maps for Scientific
+/// Visualization", 2009. Values beyond the ends get the colour of the end.
 inline std::array<std::uint8_t, 3> divergingColour(double value) {
   constexpr std::array<double, 3> low{59, 76, 192};
   constexpr std::array<double, 3> middle{221, 221, 221};

@@ -1,3 +1,10 @@
+// SSIM: Wang, Bovik, Sheikh, Simoncelli: "Image Quality Assessment: From Error Visibility to
+// Structural Similarity", IEEE Transactions on Image Processing 13(4), 2004. Contrast
+// sensitivity: Mannos, Sakrison: "The Effects of a Visual Fidelity Criterion on the Encoding of
+// Images", IEEE Transactions on Information Theory 20(4), 1974. LDR-FLIP: Andersson, Nilsson,
+// Akenine-Möller, Oskarsson, Åström, Fairchild: "FLIP: A Difference Evaluator for Alternating
+// Images", Proceedings of the ACM on Computer Graphics and Interactive Techniques 3(2), 2020.
+
 #include "ops/kernels/picture/picture_similarity.h"
 
 #include <algorithm>
@@ -16,7 +23,7 @@ namespace {
 
 enum class Beyond { mirrored, clamped };
 
-/// Which of `size` pixels stands for number `i`, which may lie beyond them.
+/// Returns the one of `size` pixels that takes the place of pixel `i`, which may lie beyond them.
 int inside(int i, int size, Beyond beyond) {
   if (beyond == Beyond::clamped) return std::clamp(i, 0, size - 1);
   const int period = 2 * size;
@@ -48,7 +55,7 @@ Weights normalized(Weights of) {
   return of;
 }
 
-/// Correlation with the product of two rows of weights.
+/// Returns the correlation with the product of two rows of weights.
 Plane filtered(const Plane& in, const Weights& across, const Weights& along, Beyond beyond) {
   Plane rows(in.width, in.height);
   tbb::parallel_for(0, in.height, [&](int y) {
@@ -83,14 +90,14 @@ Plane combined(const Plane& a, const Plane& b, const Function& function) {
 
 using Complex = std::complex<double>;
 
-std::size_t powerOfTwoFrom(int least) {
+std::size_t powerOfTwoFrom(int minimum) {
   std::size_t size = 1;
-  while (size < static_cast<std::size_t>(least)) size *= 2;
+  while (size < static_cast<std::size_t>(minimum)) size *= 2;
   return size;
 }
 
 /// The discrete Fourier transform in place, of a power of two of values, or its inverse without the
-/// division (Cooley and Tukey 1965).
+/// division (Cooley, Tukey 1965).
 void transform(std::vector<Complex>& values, bool inverse) {
   const std::size_t size = values.size();
   for (std::size_t i = 1, j = 0; i < size; ++i) {
@@ -104,7 +111,7 @@ void transform(std::vector<Complex>& values, bool inverse) {
     for (std::size_t k = 0; k < half; ++k) {
       const Complex turn = std::polar(1.0, step * static_cast<double>(k));
       for (std::size_t i = k; i < size; i += 2 * half) {
-        // Written out: the operator of std::complex looks for infinities first.
+        // Written out, because the operator of std::complex checks for infinities.
         const Complex& v = values[i + half];
         const Complex odd(v.real() * turn.real() - v.imag() * turn.imag(),
                           v.real() * turn.imag() + v.imag() * turn.real());
@@ -146,7 +153,7 @@ double mannosSakrison(double f) {
   return 2.6 * (0.0192 + 0.114 * f) * std::exp(-std::pow(0.114 * f, 1.1));
 }
 
-/// The frequency to which the eye is most sensitive, cycles per degree.
+/// Returns the frequency to which the eye is most sensitive, in cycles per degree.
 double mostVisible() {
   double best = 0;
   for (int i = 1; i <= 20000; ++i) {
@@ -167,7 +174,7 @@ constexpr std::array<Colour, 3> xyz_of_rgb{
      {2613072.0 / 12288897, 8788810.0 / 12288897, 887015.0 / 12288897},
      {1425312.0 / 73733382, 8788810.0 / 73733382, 70074185.0 / 73733382}}};
 
-/// X, Y and Z over those of white.
+/// Returns X, Y and Z divided by those of white.
 Colour relativeXyz(const Colour& rgb) {
   Colour out{};
   for (std::size_t row = 0; row < 3; ++row) {
@@ -181,13 +188,13 @@ Colour relativeXyz(const Colour& rgb) {
   return out;
 }
 
-/// The linear space of opponent colours YCxCz.
+/// Converts to the linear space of opponent colours YCxCz.
 Colour opponent(const Colour& rgb) {
   const Colour xyz = relativeXyz(rgb);
   return {116 * xyz[1] - 16, 500 * (xyz[0] - xyz[1]), 200 * (xyz[1] - xyz[2])};
 }
 
-/// What solves opponent(rgb) = `of`, by Cramer's rule.
+/// Returns the solution of opponent(rgb) = `of`, by Cramer's rule.
 Colour rgbOfOpponent(const Colour& of) {
   const double y = (of[0] + 16) / 116;
   const Colour wanted{of[1] / 500 + y, y, y - of[2] / 200};
@@ -210,7 +217,7 @@ Colour rgbOfOpponent(const Colour& of) {
   return out;
 }
 
-/// CIELAB with the chroma scaled by the lightness, for the Hunt effect.
+/// Converts to CIELAB with the chroma scaled by the lightness, for the Hunt effect.
 Colour huntLab(const Colour& rgb) {
   Colour f = relativeXyz(rgb);
   constexpr double delta = 6.0 / 29;
@@ -222,13 +229,13 @@ Colour huntLab(const Colour& rgb) {
           0.01 * lightness * 200 * (f[1] - f[2])};
 }
 
-/// The distance HyAB of Abasi, Tehran and Fairchild, 2019.
+/// Returns the HyAB distance (Abasi, Tehran, Fairchild 2019).
 double hyab(const Colour& a, const Colour& b) {
   return std::abs(a[0] - b[0]) + std::hypot(a[1] - b[1], a[2] - b[2]);
 }
 
-/// A sum of two Gaussians, a sqrt(pi/b) exp(-pi² x²/b), with x in degrees: what the eye's contrast
-/// sensitivity is in one channel of the opponent colours.
+/// The eye's contrast sensitivity in one channel of the opponent colours: a sum of two Gaussians, a
+/// sqrt(pi/b) exp(-pi² x²/b), with x in degrees.
 struct OpponentFilter {
   double a1, b1, a2, b2;
 };
@@ -258,7 +265,7 @@ Plane filtered(const Plane& in, const OpponentFilter& filter, double pixels_per_
   return out;
 }
 
-/// Positive weights that sum to 1 and negative ones that sum to -1.
+/// Scales positive weights to sum to 1 and negative ones to sum to -1.
 Weights balanced(Weights of) {
   double above = 0;
   double below = 0;
@@ -267,8 +274,8 @@ Weights balanced(Weights of) {
   return of;
 }
 
-/// The length of the first or second derivative of a picture, by Gaussians as wide as what the eye
-/// takes for an edge or a point.
+/// Returns the magnitude of the first or second derivative of a picture, by Gaussians of the width
+/// of the edges or points that the eye detects.
 Plane feature(const Plane& luminance, double pixels_per_degree, bool points) {
   const double sigma = 0.5 * 0.082 * pixels_per_degree;
   const int radius = static_cast<int>(std::ceil(3 * sigma));
@@ -283,7 +290,7 @@ Plane feature(const Plane& luminance, double pixels_per_degree, bool points) {
 
 /// A picture as FLIP compares it.
 struct FlipView {
-  std::array<Plane, 3> colour;  ///< Hunt-adjusted CIELAB of what the eye passes on
+  std::array<Plane, 3> colour;  ///< Hunt-adjusted CIELAB of the picture as the eye perceives it
   Plane edges, points;
 };
 
@@ -350,7 +357,7 @@ double contrastSensitivity(double cycles_per_degree) {
 }
 
 Plane seenByTheEye(const Plane& picture, double pixels_per_degree) {
-  // What a pixel gives to others is nothing beyond two thirds of a degree.
+  // A pixel does not affect others beyond two thirds of a degree.
   const int margin = static_cast<int>(std::ceil(pixels_per_degree * 2 / 3));
   const std::size_t width = powerOfTwoFrom(picture.width + 2 * margin);
   const std::size_t height = powerOfTwoFrom(picture.height + 2 * margin);
@@ -393,16 +400,17 @@ Plane flipDifference(const ColourPlanes& reference, const ColourPlanes& test,
   constexpr double bend_to = 0.95;
   const FlipView a = flipView(reference, pixels_per_degree);
   const FlipView b = flipView(test, pixels_per_degree);
-  const double most = std::pow(hyab(huntLab({0, 1, 0}), huntLab({0, 0, 1})), colour_exponent);
+  const double maximum = std::pow(hyab(huntLab({0, 1, 0}), huntLab({0, 0, 1})), colour_exponent);
   Plane map(reference[0].width, reference[0].height);
   for (std::size_t i = 0; i < map.values.size(); ++i) {
     const auto colourOf = [i](const FlipView& view) {
       return Colour{view.colour[0].values[i], view.colour[1].values[i], view.colour[2].values[i]};
     };
     const double raised = std::pow(hyab(colourOf(a), colourOf(b)), colour_exponent);
-    const double bend = bend_from * most;
-    const double colour = raised < bend ? bend_to / bend * raised
-                                        : bend_to + (raised - bend) / (most - bend) * (1 - bend_to);
+    const double bend = bend_from * maximum;
+    const double colour = raised < bend
+                              ? bend_to / bend * raised
+                              : bend_to + (raised - bend) / (maximum - bend) * (1 - bend_to);
     const double features = std::max(std::abs(a.edges.values[i] - b.edges.values[i]),
                                      std::abs(a.points.values[i] - b.points.values[i]));
     const double sharp =

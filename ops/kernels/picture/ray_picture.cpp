@@ -1,3 +1,6 @@
+// Burley: "Practical Hash-based Owen Scrambling", Journal of Computer Graphics Techniques 9(4),
+// 2020.
+
 #include "ops/kernels/picture/ray_picture.h"
 
 #include <algorithm>
@@ -47,8 +50,8 @@ std::uint32_t scrambled(std::uint32_t x, std::uint32_t seed) {
   return reversed(x);
 }
 
-/// Point `index` of the first two dimensions of Sobol's sequence, shuffled and scrambled: two
-/// numbers in [0, 1).
+/// Returns point `index` of the first two dimensions of the Sobol sequence, shuffled and scrambled:
+/// two numbers in [0, 1).
 std::array<double, 2> patternPoint(std::uint32_t index, std::uint32_t seed) {
   index = scrambled(index, seed);
   std::uint32_t second = 0;
@@ -67,13 +70,13 @@ struct Lamp {
   Vec3d centre;
   Vec3d facing;         ///< unit
   Vec3d across, along;  ///< sides, mm
-  double radiance = 0;  ///< so that what it gives to the target is as wanted
+  double radiance = 0;  ///< scaled to the irradiance at the target
 
   [[nodiscard]] Vec3d at(const std::array<double, 2>& place) const {
     return centre + (place[0] - 0.5) * across + (place[1] - 0.5) * along;
   }
 
-  /// What a whole lamp around `place` would give to an open surface at `p`.
+  /// Returns the irradiance of an unobstructed surface at `p` if all of the lamp were at `place`.
   [[nodiscard]] double given(const Vec3d& place, const Vec3d& p, const Vec3d& normal) const {
     const Vec3d way = place - p;
     const double distance_2 = way.lengthSqr();
@@ -87,11 +90,11 @@ struct Lamp {
 
 struct Lighting {
   std::optional<Lamp> lamp;
-  double lamp_share = 0;  ///< of what a horizontal open place gets
+  double lamp_share = 0;  ///< of the irradiance of an unobstructed horizontal surface
   double sky_share = 0;
 };
 
-/// Scaled so that a horizontal surface at the target gets 1.
+/// Returns a lamp scaled so that a horizontal surface at the target gets 1.
 Lamp lampFrom(const Vec3d& target, double azimuth_degrees, double elevation_degrees, double side_mm,
               double distance_mm) {
   const double azimuth = radians(azimuth_degrees);
@@ -124,11 +127,11 @@ Lighting lightingOf(Look look, const Camera& camera) {
   return {};
 }
 
-/// A direction about `normal`, as dense as its cosine.
+/// Returns a direction about `normal`, with a density proportional to its cosine.
 Vec3d matt(const Vec3d& normal, const std::array<double, 2>& at) {
   const double angle = 2 * std::numbers::pi * at[0];
   const double radius = std::sqrt(at[1]);
-  // One axis is horizontal: the horizon then cuts the pattern alike for neighbouring normals.
+  // One axis is horizontal, so that the horizon cuts the pattern similarly for similar normals.
   Vec3d first(-normal.y(), normal.x(), 0);
   if (!first.normalize(1e-12)) first = Vec3d(1, 0, 0);
   const Vec3d second = normal.cross(first);
@@ -136,7 +139,7 @@ Vec3d matt(const Vec3d& normal, const std::array<double, 2>& at) {
          std::sqrt(std::max(0.0, 1 - at[1])) * normal;
 }
 
-/// Of all hits that it is offered, the nearest, and of those the lowest triangle.
+/// Keeps the nearest of all hits, and of equally near ones the lowest triangle.
 struct NearestContext {
   RTCIntersectContext context;
   float distance;
@@ -204,10 +207,10 @@ void frame(Camera& camera, const Mesh& mesh, int margin) {
     low_y = std::min(low_y, y);
     high_y = std::max(high_y, y);
   }
-  constexpr double most = 16384;
+  constexpr double maximum = 16384;
   const double columns = std::ceil(high_x) - std::floor(low_x) + 2.0 * margin;
   const double rows = std::ceil(high_y) - std::floor(low_y) + 2.0 * margin;
-  if (!(columns <= most && rows <= most))
+  if (!(columns <= maximum && rows <= maximum))
     throw DataError("the picture would have more than 16384 pixels on a side; take larger ones");
   camera.left = static_cast<int>(std::floor(low_x)) - margin;
   camera.top = static_cast<int>(std::ceil(high_y)) + margin;
@@ -218,8 +221,8 @@ void frame(Camera& camera, const Mesh& mesh, int margin) {
 struct RayScene::Rays {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
-  Vec3d centre;          ///< of the mesh, where the scene has its origin
-  double radius_mm = 0;  ///< of a sphere around all of it
+  Vec3d centre;          ///< of the mesh, the origin of the scene
+  double radius_mm = 0;  ///< of a sphere around the mesh
   const float* vertices = nullptr;
   const std::uint32_t* triangles = nullptr;
 
@@ -236,9 +239,9 @@ struct RayScene::Rays {
     return {at[0], at[1], at[2]};
   }
 
-  /// The triangle that a ray meets first, or none. Embree finds where; of triangles that meet
-  /// there, which one it names depends on how its threads built the tree, so that all hits in a
-  /// thin shell are asked for again.
+  /// Returns the triangle that a ray meets first, or nothing. Embree finds the place; but which of
+  /// several triangles there it reports depends on how its threads have built the tree, so that all
+  /// hits in a thin shell are queried again.
   [[nodiscard]] std::optional<std::uint32_t> met(const Vec3d& origin, const Vec3d& direction,
                                                  float far) const {
     NearestContext context{};
@@ -309,89 +312,128 @@ RayScene::RayScene(const Mesh& mesh) : rays_(std::make_unique<Rays>()) {
 
 RayScene::~RayScene() = default;
 
+/// Draws pixels of one picture. All positions are in the scene's own coordinates.
+class RayScene::Painter {
+ public:
+  Painter(const Rays& rays, const Camera& camera, Look look)
+      : rays_(rays),
+        camera_(camera),
+        lighting_(lightingOf(look, camera)),
+        target_(camera.target - rays.centre),
+        axes_(camera.axes()),
+        radius_(1.001 * rays.radius_mm) {
+    if (lighting_.lamp) lighting_.lamp->centre -= rays.centre;
+  }
+
+  struct Pixel {
+    double light = 0;  ///< the sum over the samples that meet the mesh
+    int covered = 0;   ///< their number
+  };
+  [[nodiscard]] Pixel pixel(int column, int row, int samples, std::uint32_t seed) const;
+
+ private:
+  struct Ray {
+    Vec3d origin, direction;
+  };
+
+  [[nodiscard]] std::optional<Ray> rayThrough(int column, double dx, int row, double dy) const;
+  [[nodiscard]] double lightAt(const Vec3d& p, const Vec3d& normal, std::uint32_t sample,
+                               std::uint32_t pattern) const;
+
+  const Rays& rays_;
+  const Camera& camera_;
+  Lighting lighting_;
+  Vec3d target_;
+  std::array<Vec3d, 3> axes_;
+  double radius_;
+};
+
+/// Returns the light at a point of the surface, from one sample of the lamp and one of the sky.
+double RayScene::Painter::lightAt(const Vec3d& p, const Vec3d& normal, std::uint32_t sample,
+                                  std::uint32_t pattern) const {
+  double light = 0;
+  if (const std::optional<Lamp>& lamp = lighting_.lamp) {
+    const Vec3d place = lamp->at(patternPoint(sample, hashed(pattern + 1)));
+    const double given = lamp->given(place, p, normal);
+    const Vec3d way = place - p;
+    const double distance = way.length();
+    if (given > 0 &&
+        !rays_.isDark(p, way / distance, static_cast<float>(std::min(distance, 4 * radius_))))
+      light += lighting_.lamp_share * given;
+  }
+  if (lighting_.sky_share > 0) {
+    const Vec3d way = matt(normal, patternPoint(sample, hashed(pattern + 2)));
+    if (way.z() > 0 && !rays_.isDark(p, way, static_cast<float>(4 * radius_)))
+      light += lighting_.sky_share;
+  }
+  return light;
+}
+
+/// Returns the ray through a place of the picture, or nothing if it misses the sphere around the
+/// mesh. It begins where it enters the sphere, so that coordinates are small.
+std::optional<RayScene::Painter::Ray> RayScene::Painter::rayThrough(int column, double dx, int row,
+                                                                    double dy) const {
+  const auto& [right, up, towards] = axes_;
+  const Vec3d on_plane = target_ + (camera_.left + column + dx) * camera_.pixel_mm * right +
+                         (camera_.top - row - dy) * camera_.pixel_mm * up;
+  const Vec3d direction = camera_.distance_mm > 0
+                              ? (on_plane - (target_ + camera_.distance_mm * towards)).unit()
+                              : Vec3d(-towards);
+  const double middle = -on_plane.dot(direction);
+  const double inside = radius_ * radius_ - (on_plane + middle * direction).lengthSqr();
+  if (inside <= 0) return std::nullopt;
+  double begin = middle - std::sqrt(inside);
+  if (camera_.distance_mm > 0) {
+    const double eye = -(on_plane - (target_ + camera_.distance_mm * towards)).length();
+    begin = std::max(begin, eye);
+  }
+  return Ray{on_plane + begin * direction, direction};
+}
+
+RayScene::Painter::Pixel RayScene::Painter::pixel(int column, int row, int samples,
+                                                  std::uint32_t seed) const {
+  // Far more than the rounding of a point to float, far less than a voxel.
+  const double lift = 2e-6 * radius_;
+  const std::uint32_t place = hashed(static_cast<std::uint32_t>(column) +
+                                     hashed(static_cast<std::uint32_t>(row) + hashed(seed)));
+  Pixel pixel;
+  for (int sample = 0; sample < samples; ++sample) {
+    const auto index = static_cast<std::uint32_t>(sample);
+    const auto [dx, dy] = patternPoint(index, place);
+    const std::optional<Ray> ray = rayThrough(column, dx, row, dy);
+    if (!ray) continue;
+    const auto triangle = rays_.met(ray->origin, ray->direction, static_cast<float>(4 * radius_));
+    if (!triangle) continue;
+    ++pixel.covered;
+    const Vec3d corner = rays_.corner(*triangle, 0);
+    Vec3d normal = (rays_.corner(*triangle, 1) - corner).cross(rays_.corner(*triangle, 2) - corner);
+    const double facing = normal.dot(ray->direction);
+    if (facing == 0) continue;
+    const double distance = normal.dot(corner - ray->origin) / facing;
+    normal *= (facing > 0 ? -1 : 1) / normal.length();
+    pixel.light +=
+        lightAt(ray->origin + distance * ray->direction + lift * normal, normal, index, place);
+  }
+  return pixel;
+}
+
 RayPicture RayScene::picture(const Camera& camera, Look look, int samples, std::uint32_t seed,
                              const std::function<void(double)>& progress) const {
   const std::size_t pixels =
       static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   RayPicture picture{camera.width, camera.height, std::vector<float>(pixels),
                      std::vector<float>(pixels)};
-  Lighting lighting = lightingOf(look, camera);
-  // All in the scene's own coordinates.
-  const Vec3d target = camera.target - rays_->centre;
-  if (lighting.lamp) lighting.lamp->centre -= rays_->centre;
-  const std::array<Vec3d, 3> axes = camera.axes();
-  const Vec3d& right = axes[0];
-  const Vec3d& up = axes[1];
-  const Vec3d& towards = axes[2];
-  const double radius = 1.001 * rays_->radius_mm;
-  // Beyond what rounding to float makes of a point, and far less than a voxel.
-  const double lift = 2e-6 * radius;
-
-  const auto lightAt = [&, &lamp = lighting.lamp](const Vec3d& p, const Vec3d& normal,
-                                                  std::uint32_t sample, std::uint32_t pattern) {
-    double light = 0;
-    if (lamp) {
-      const Vec3d place = lamp->at(patternPoint(sample, hashed(pattern + 1)));
-      const double given = lamp->given(place, p, normal);
-      const Vec3d way = place - p;
-      const double distance = way.length();
-      if (given > 0 &&
-          !rays_->isDark(p, way / distance, static_cast<float>(std::min(distance, 4 * radius))))
-        light += lighting.lamp_share * given;
-    }
-    if (lighting.sky_share > 0) {
-      const Vec3d way = matt(normal, patternPoint(sample, hashed(pattern + 2)));
-      if (way.z() > 0 && !rays_->isDark(p, way, static_cast<float>(4 * radius)))
-        light += lighting.sky_share;
-    }
-    return light;
-  };
-
-  const auto drawPixel = [&](int column, int row) {
-    const std::uint32_t place = hashed(static_cast<std::uint32_t>(column) +
-                                       hashed(static_cast<std::uint32_t>(row) + hashed(seed)));
-    double light = 0;
-    int covered = 0;
-    for (int sample = 0; sample < samples; ++sample) {
-      const auto index = static_cast<std::uint32_t>(sample);
-      const auto [dx, dy] = patternPoint(index, place);
-      const Vec3d on_plane = target + (camera.left + column + dx) * camera.pixel_mm * right +
-                             (camera.top - row - dy) * camera.pixel_mm * up;
-      const Vec3d direction = camera.distance_mm > 0
-                                  ? (on_plane - (target + camera.distance_mm * towards)).unit()
-                                  : Vec3d(-towards);
-      // From where the ray comes to the sphere around the mesh, where numbers are small.
-      const double middle = -on_plane.dot(direction);
-      const double inside = radius * radius - (on_plane + middle * direction).lengthSqr();
-      if (inside <= 0) continue;
-      double begin = middle - std::sqrt(inside);
-      if (camera.distance_mm > 0) {
-        const double eye = -(on_plane - (target + camera.distance_mm * towards)).length();
-        begin = std::max(begin, eye);
-      }
-      const Vec3d origin = on_plane + begin * direction;
-      const auto triangle = rays_->met(origin, direction, static_cast<float>(4 * radius));
-      if (!triangle) continue;
-      ++covered;
-      const Vec3d corner = rays_->corner(*triangle, 0);
-      Vec3d normal =
-          (rays_->corner(*triangle, 1) - corner).cross(rays_->corner(*triangle, 2) - corner);
-      const double facing = normal.dot(direction);
-      if (facing == 0) continue;
-      const double distance = normal.dot(corner - origin) / facing;
-      normal *= (facing > 0 ? -1 : 1) / normal.length();
-      light += lightAt(origin + distance * direction + lift * normal, normal, index, place);
-    }
-    const std::size_t pixel = static_cast<std::size_t>(row) * camera.width + column;
-    picture.cover[pixel] = static_cast<float>(covered) / static_cast<float>(samples);
-    if (covered > 0) picture.light[pixel] = static_cast<float>(light / covered);
-  };
-
+  const Painter painter(*rays_, camera, look);
   constexpr int rows_at_once = 16;
   for (int begin = 0; begin < camera.height; begin += rows_at_once) {
     progress(static_cast<double>(begin) / camera.height);
     tbb::parallel_for(begin, std::min(begin + rows_at_once, camera.height), [&](int row) {
-      for (int column = 0; column < camera.width; ++column) drawPixel(column, row);
+      for (int column = 0; column < camera.width; ++column) {
+        const auto [light, covered] = painter.pixel(column, row, samples, seed);
+        const std::size_t at = static_cast<std::size_t>(row) * camera.width + column;
+        picture.cover[at] = static_cast<float>(covered) / static_cast<float>(samples);
+        if (covered > 0) picture.light[at] = static_cast<float>(light / covered);
+      }
     });
   }
   return picture;

@@ -1,5 +1,7 @@
 #pragma once
 
+// The picture family: kernels that draw meshes and compare pictures.
+
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -12,62 +14,62 @@
 
 namespace vdbdither {
 
-/// From where a mesh is looked at. The picture lies in the plane through `target` that the line of
-/// sight meets at a right angle; `left` and `top` count its pixels from `target`, rightwards and
-/// upwards.
+/// The view of a mesh. The picture lies in the plane through `target` perpendicular to the line of
+/// sight; `left` and `top` count its pixels from `target`, rightwards and upwards.
 struct Camera {
   openvdb::Vec3d target{0, 0, 0};  ///< mm
   double azimuth_degrees = 0;      ///< 0 looks from the front, along +y; 90 from the right
   double elevation_degrees = 0;    ///< 90 looks from above
-  double distance_mm = 0;          ///< from the eye to `target`; 0: infinite, orthographic
+  double distance_mm = 0;          ///< from the eye to `target`; 0 for an orthographic view
   double pixel_mm = 1;
   int left = 0, top = 0;
   int width = 0, height = 0;
 
-  /// To the right, up, and towards the eye.
+  /// Returns the directions to the right, up, and towards the eye.
   [[nodiscard]] std::array<openvdb::Vec3d, 3> axes() const;
 };
 
-/// Places the picture so that all of `mesh` is in it, with `margin` pixels around: its centre
-/// becomes the target, and `left`, `top`, `width` and `height` are set. Throws DataError where the
-/// mesh reaches the eye, or the picture would be larger than 16384 pixels.
+/// Sets the picture so that it holds all of `mesh` with a margin of `margin` pixels: the centre
+/// becomes the target, and `left`, `top`, `width` and `height` are set. Throws DataError if the
+/// mesh reaches the eye, or if the picture would be larger than 16384 pixels.
 void frame(Camera& camera, const Mesh& mesh, int margin);
 
-/// The lights that a picture can be made with. A horizontal, open place of the object gets the same
-/// irradiance from each.
+/// The lights of a picture. An unobstructed horizontal surface gets the same irradiance from each.
 enum class Look {
   area,      ///< a lamp of 30 cm, 1 m above, and a quarter of `sky`
   large,     ///< a light of 2 m, 1 m above
-  sky,       ///< a dome, alike from everywhere above the horizon
+  sky,       ///< a uniform dome above the horizon
   staircase  ///< a lamp of 10 cm, 1 m away and 10 degrees high, from the left, and some `sky`
 };
 
-/// What a camera gets.
+/// A rendered picture.
 struct RayPicture {
   int width = 0, height = 0;
-  /// Linear; of what the object covers of a pixel. A perfectly white horizontal place has 1.
+  /// Linear light of the part of a pixel that the object covers; 1 for a perfectly white horizontal
+  /// surface.
   std::vector<float> light;
   std::vector<float> cover;  ///< the share of a pixel that the object covers
 };
 
-/// A mesh, ready for rays (Embree). White, matt (Lambert), facets as they are; direct light only.
+/// A mesh prepared for ray tracing (Embree): white, matt (Lambert), flat facets, direct light only.
 class RayScene {
  public:
-  /// `mesh` in mm. Throws DataError where Embree refuses.
+  /// `mesh` in mm. Throws DataError if Embree fails.
   explicit RayScene(const Mesh& mesh);
   ~RayScene();
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// The picture. Depends on the mesh, the camera, the look and `samples` alone: every pixel has a
-  /// pattern of its own, an Owen-scrambled Sobol sequence (Burley: "Practical Hash-based Owen
-  /// Scrambling", 2020), scrambled by its place and `seed`; and where a ray meets an edge, the
-  /// triangle of the least number counts.
+  /// Returns the picture, which depends on the arguments and the mesh alone: every pixel has its
+  /// own pattern, an Owen-scrambled Sobol sequence (Burley 2020), scrambled by its place and
+  /// `seed`; and of triangles that a ray meets at the same place the one with the lowest index
+  /// counts.
   [[nodiscard]] RayPicture picture(const Camera& camera, Look look, int samples, std::uint32_t seed,
                                    const std::function<void(double)>& progress) const;
 
  private:
   struct Rays;
+  class Painter;
   std::unique_ptr<Rays> rays_;
 };
 

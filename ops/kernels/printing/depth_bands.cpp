@@ -1,9 +1,9 @@
 // A Euclidean distance transform by axes (T. Saito, J. Toriwaki, "New algorithms for Euclidean
 // distance transformation of an n-dimensional digitized picture", Pattern Recognition 27, 1994),
-// each pass cut at the greatest depth of interest and done only for leaf-sized blocks that hold
-// voxels: along z from the bits of the leaves, then y, then x. A pass goes outwards from each plane
-// of a block and ends as soon as no step further can change what comes of it: along x, that is
-// where every voxel of the plane is known to lie in the outermost band.
+// each pass limited to the maximum depth of the bands and to leaf-sized blocks that hold voxels:
+// along z from the bits of the leaves, then y, then x. A pass goes outwards from each plane of a
+// block and ends when no further step can change the result: along x, when every voxel of the plane
+// is known to lie in the outermost band.
 
 #include "ops/kernels/printing/depth_bands.h"
 
@@ -43,14 +43,14 @@ bool all(const LeafBits& bits) {
   return std::all_of(bits.begin(), bits.end(), [](std::uint64_t word) { return ~word == 0; });
 }
 
-/// Squared distances of a block's voxels; stored only where they differ.
+/// The squared distances of a block's voxels; they are stored only if they differ.
 struct Block {
   enum class State { unknown, zero, beyond_reach, mixed };
   State state = State::unknown;
   std::array<float, volume> squares;  ///< planes along the axis of the next pass
 };
 
-/// The squared distances of a plane while they are lowered.
+/// The squared distances of a plane, while they are reduced.
 using Plane = std::array<float, plane>;
 
 /// to[i] = min(to[i], from[i] + added).
@@ -63,26 +63,27 @@ void lower(Plane& to, float added) {
   for (float& square : to) square = std::min(square, added);
 }
 
-float greatest(const Plane& squares) {
-  Plane most = squares;
-  // Halves against each other, so that no lane waits for another.
-  for (std::size_t half = most.size() / 2; half >= 4; half /= 2) {
-    for (std::size_t i = 0; i < half; ++i) most[i] = std::max(most[i], most[i + half]);
+float maximumOf(const Plane& squares) {
+  Plane maximum = squares;
+  // Compares halves, so that lanes do not depend on each other.
+  for (std::size_t half = maximum.size() / 2; half >= 4; half /= 2) {
+    for (std::size_t i = 0; i < half; ++i) maximum[i] = std::max(maximum[i], maximum[i + half]);
   }
-  return std::max(std::max(most[0], most[1]), std::max(most[2], most[3]));
+  return std::max(std::max(maximum[0], maximum[1]), std::max(maximum[2], maximum[3]));
 }
 
 int leafOrigin(int index) { return index & ~(edge - 1); }
 
-/// Steps of `pitch_mm` within `depth_mm`, with a hair of tolerance: n steps hold n of them.
+/// Returns the number of steps of `pitch_mm` within `depth_mm`, with a small tolerance, so that a
+/// depth of n steps holds n.
 int stepsWithin(double depth_mm, double pitch_mm) {
   return static_cast<int>(depth_mm * (1 + 1e-6) / pitch_mm);
 }
 
-/// What comes back at one place.
+/// The result for one block.
 struct Output {
   Coord origin;
-  std::unique_ptr<Int32Leaf> leaf;  ///< none: a tile
+  std::unique_ptr<Int32Leaf> leaf;  ///< null for a tile
   std::int32_t value = 0;
 };
 
@@ -115,7 +116,7 @@ class StripTransform {
     for (Row& row : rows_) row.blocks.resize(blocks_.size());
   }
 
-  /// Adds the blocks at (·, y, z) that hold voxels to `out`. Cheapest where y rises in one z.
+  /// Adds the blocks at (·, y, z) that hold voxels to `out`. Fastest if y rises at the same z.
   void run(int y, int z, std::vector<Output>& out) {
     using Branch = BoolTree::RootNodeType::ChildNodeType::ChildNodeType;
     constexpr int branch_edge = static_cast<int>(Branch::DIM);
@@ -137,13 +138,13 @@ class StripTransform {
   [[nodiscard]] int reach(int axis) const { return static_cast<int>(squares_[axis].size()) - 1; }
   [[nodiscard]] int blocksWithinReach(int axis) const { return (reach(axis) + edge - 1) / edge; }
 
-  /// The blocks at (·, y, z) after the pass along z, made as they are asked for.
+  /// The blocks at (·, y, z) after the pass along z, made on demand.
   struct Row {
     int y = 0;
     std::vector<Block> blocks;
   };
 
-  /// Which of the rows, a ring, is that of `y`.
+  /// Returns the row of `y`, from a ring of rows.
   [[nodiscard]] Row& row(int y) {
     const int count = static_cast<int>(rows_.size());
     return rows_[((y / edge) % count + count) % count];
@@ -178,7 +179,8 @@ class StripTransform {
     return bits;
   }
 
-  /// Solid voxels in a row above (or below) each column of the block, counted as far as the reach.
+  /// Returns the number of consecutive solid voxels above (or below) each column of the block, up
+  /// to the reach.
   [[nodiscard]] std::array<int, plane> solidBeyond(const Coord& origin, bool above) const {
     std::array<int, plane> count{};
     std::array<bool, plane> open;
@@ -204,7 +206,7 @@ class StripTransform {
     return count;
   }
 
-  /// Along z: to the nearest empty voxel of the column.
+  /// The pass along z: the distance to the nearest empty voxel of the column.
   const Block& passZ(int index, const Coord& origin) {
     Block& block = row(origin.y()).blocks[index + blocksWithinReach(0)];
     if (block.state != Block::State::unknown) return block;
@@ -239,33 +241,33 @@ class StripTransform {
     return block;
   }
 
-  /// The least over the planes of a row of blocks around plane `at`, as far as the reach or until
-  /// nothing above `enough` can get lower.
+  /// Returns the minimum over the planes of a row of blocks around plane `at`, up to the reach, or
+  /// until no value above `enough` can be reduced.
   template <typename BlockAt>
-  Plane leastAround(int at, int axis, float enough, const BlockAt& block_at) const {
-    Plane least;
-    least.fill(infinite);
+  Plane minimumAround(int at, int axis, float enough, const BlockAt& block_at) const {
+    Plane minimum;
+    minimum.fill(infinite);
     const std::vector<float>& added = squares_[axis];
     const auto take = [&](int from, float square) {
       const Block& source = block_at(from / edge);
-      if (source.state == Block::State::zero) lower(least, square);
+      if (source.state == Block::State::zero) lower(minimum, square);
       if (source.state == Block::State::mixed)
-        lower(least, source.squares.data() + from % edge * plane, square);
+        lower(minimum, source.squares.data() + from % edge * plane, square);
     };
     take(at, added[0]);
     for (int step = 1; step <= reach(axis); ++step) {
-      // Every step is worth a look at first, every eighth later.
+      // Tested at every step at first, at every eighth later.
       if (step <= 4 || step % edge == 0) {
-        const float most = greatest(least);
-        if (most <= std::max(enough, added[step])) break;
+        const float maximum = maximumOf(minimum);
+        if (maximum <= std::max(enough, added[step])) break;
       }
       take(at - step, added[step]);
       take(at + step, added[step]);
     }
-    return least;
+    return minimum;
   }
 
-  /// Along y, from the columns in front and behind. Made once per block.
+  /// The pass along y, from the columns in front and behind. Made once per block.
   const Block& passY(int index, const Coord& origin) {
     Block& block = blocks_[index + blocksWithinReach(0)];
     if (block.state != Block::State::unknown) return block;
@@ -281,11 +283,11 @@ class StripTransform {
     }
     block.state = Block::State::beyond_reach;
     for (int y = 0; y < edge && !all_beyond; ++y) {
-      const Plane least =
-          leastAround(y + margin * edge, 1, 0, [&](int i) -> const Block& { return *along_y_[i]; });
+      const Plane minimum = minimumAround(y + margin * edge, 1, 0,
+                                          [&](int i) -> const Block& { return *along_y_[i]; });
       for (int x = 0; x < edge; ++x) {
         for (int z = 0; z < edge; ++z) {
-          const float square = least[x * edge + z];
+          const float square = minimum[x * edge + z];
           if (square <= limits_.back()) block.state = Block::State::mixed;
           block.squares[(x * edge + y) * edge + z] = square;
         }
@@ -294,7 +296,7 @@ class StripTransform {
     return block;
   }
 
-  /// Along x, and the bands.
+  /// The pass along x, and the bands.
   Output makeOutput(int index, const Coord& origin, const LeafBits& bits) {
     const int margin = blocksWithinReach(0);
     bool all_beyond = true;
@@ -306,9 +308,10 @@ class StripTransform {
     std::array<float, volume> squares;
     squares.fill(infinite);
     for (int x = 0; x < edge && !all_beyond; ++x) {
-      const Plane least = leastAround(x + margin * edge, 0, limits_.front(),
-                                      [&](int i) -> const Block& { return blocks_[index + i]; });
-      std::copy(least.begin(), least.end(), squares.begin() + x * plane);
+      const Plane minimum =
+          minimumAround(x + margin * edge, 0, limits_.front(),
+                        [&](int i) -> const Block& { return blocks_[index + i]; });
+      std::copy(minimum.begin(), minimum.end(), squares.begin() + x * plane);
     }
     std::array<std::int32_t, volume> values{};
     for (int i = 0; i < volume; ++i) {
@@ -341,9 +344,9 @@ class StripTransform {
   int x_blocks_;
   std::array<std::vector<float>, 3> squares_;  ///< per axis, (i · pitch)² within reach
   std::vector<float> limits_;                  ///< per band, squared
-  std::vector<Block> blocks_;                  ///< the row after the pass along y, with margins
-  std::vector<Row> rows_;                      ///< those around it after the pass along z
-  std::vector<const Block*> along_y_;          ///< of those, what one block needs
+  std::vector<Block> blocks_;          ///< the row of blocks after the pass along y, with margins
+  std::vector<Row> rows_;              ///< the rows around it after the pass along z
+  std::vector<const Block*> along_y_;  ///< the blocks of these rows that one block needs
   int z_ = 0;
 };
 
@@ -362,8 +365,8 @@ openvdb::Int32Grid::Ptr valueByDepth(const openvdb::BoolGrid& solid, const openv
   const int y_begin = leafOrigin(region.min().y());
   const int strips = (region.max().y() - y_begin) / edge + 1;
   const ZRange layers = alignedToLeaves(core);
-  // A piece of work is some strips of one layer of leaves: enough of them that what their margins
-  // share is made once, few enough that threads have something to do.
+  // A piece of work is some strips of one layer of leaves: enough to share most of their margins,
+  // few enough to keep all threads busy.
   constexpr int strips_per_piece = 16;
   const int pieces_per_layer = (strips + strips_per_piece - 1) / strips_per_piece;
   const int pieces = pieces_per_layer * (layers.size() / edge);

@@ -25,7 +25,7 @@ constexpr float negligible = 1e-5F;
 
 std::vector<float> weightsAlong(double pitch_mm, double sigma_mm) {
   if (!(sigma_mm > 0)) return {1.0F};
-  // The first voxel that lies beyond is left out with the tail.
+  // The first voxel wholly beyond is omitted with the tail.
   const int reach =
       std::max(0, static_cast<int>(std::ceil(GaussianSpread::sigmas * sigma_mm / pitch_mm - 0.5)));
   std::vector<double> shares;
@@ -44,15 +44,15 @@ std::vector<float> weightsAlong(double pitch_mm, double sigma_mm) {
 
 int reachOf(const std::vector<float>& weights) { return static_cast<int>(weights.size() / 2); }
 
-/// What the voxels of a leaf or of its surroundings have in common.
+/// The common value of the voxels of a leaf or of its surroundings.
 enum class Content : std::uint8_t { unknown = 0, empty = 1, full = 2, mixed = 3 };
 
-/// The bits of the voxels of a job, and what every leaf holds.
+/// The bits of the voxels of a job, and the content of every leaf.
 class Occupancy {
  public:
   Occupancy(const openvdb::BoolGrid& solid, const CoordBBox& box, ZRange valid)
       : frame_(box), box_(box), valid_(valid), layers_(bitLayers(solid, frame_, valid)) {
-    // One leaf of nothing all around.
+    // One empty leaf on every side.
     first_leaf_ = Coord(frame_.xBegin() - leaf_layers, (box.min().y() & ~7) - leaf_layers,
                         alignedToLeaves(valid).begin - leaf_layers);
     leaves_ = Coord((box.max().x() - first_leaf_.x()) / leaf_layers + 2,
@@ -69,7 +69,7 @@ class Occupancy {
     });
   }
 
-  /// Eight bits from x on; x is a multiple of 8.
+  /// Returns eight bits from x on, a multiple of 8.
   [[nodiscard]] std::uint8_t byte(int x, int y, int z) const {
     const int row = y - frame_.yBegin();
     const int at = x - frame_.xBegin();
@@ -81,7 +81,7 @@ class Occupancy {
     return static_cast<std::uint8_t>(word >> (at % 64));
   }
 
-  /// What the leaves have in common that `reach` touches from the leaf at `origin`.
+  /// Returns the common content of the leaves within `reach` of the leaf at `origin`.
   [[nodiscard]] Content around(const Coord& origin, const Coord& reach) const {
     int seen = 0;
     const Coord low = leafOf(origin - reach);
@@ -111,7 +111,8 @@ class Occupancy {
                static_cast<std::size_t>(leaves_.x()) +
            static_cast<std::size_t>(leaf.x());
   }
-  /// Layers of the job that are not here are not asked for; beyond the box there is nothing.
+  /// Layers of the job that are not in `valid` are never requested; beyond the box everything is
+  /// empty.
   [[nodiscard]] Content beyond(const Coord& leaf) const {
     const int z = first_leaf_.z() + leaf_layers * leaf.z();
     const bool here = z >= box_.min().z() && z + leaf_layers - 1 <= box_.max().z();
@@ -148,10 +149,10 @@ class Occupancy {
   std::vector<Content> contents_;
 };
 
-/// Eight neighbours along x.
+/// Eight adjacent values along x.
 using Octet = std::array<float, 8>;
 
-/// Σ weights[n]·values[n] for eight columns at once.
+/// Returns Σ weights[n]·values[n] for eight columns.
 Octet weighted(const std::vector<float>& weights, const Octet* values, std::size_t stride) {
   Octet sum{};
   for (const float weight : weights) {
@@ -173,7 +174,7 @@ class LeafSpread {
         along_x_(static_cast<std::size_t>((8 + 2 * reach_.y()) * (8 + 2 * reach_.z()))),
         along_y_(static_cast<std::size_t>(8 * (8 + 2 * reach_.z()))) {}
 
-  /// The shares of the leaf at `origin`, in the order of a leaf.
+  /// Writes the shares of the leaf at `origin`, in the order of a leaf.
   void operator()(const Coord& origin, float* shares) {
     const int rows = 8 + 2 * reach_.y();
     const int layers = 8 + 2 * reach_.z();

@@ -1,5 +1,8 @@
 #pragma once
 
+// The printing family: kernels that model the printing process (the spread of droplets) and that
+// assign values by depth.
+
 #include <array>
 #include <vector>
 
@@ -9,32 +12,32 @@
 
 namespace vdbdither {
 
-/// The share of material at every voxel centre after droplets have spread: the printed voxels, each
-/// a full box, convolved with a Gaussian.
+/// Computes the share of material at every voxel centre after droplets have spread: the printed
+/// voxels, each a full box, convolved with a Gaussian.
 ///
-/// Separable; along each axis the weights are the shares of the Gaussian over the voxels within
-/// `sigmas` standard deviations, made to sum to one. Sums of floats in rising order of the index, x
-/// before y before z. What is within 10⁻⁵ of 0 or 1 counts as that.
+/// The convolution is separable. Along each axis the weights are the shares of the Gaussian over
+/// the voxels within `sigmas` standard deviations, scaled to sum to one. Floats are summed in
+/// rising order of the index, x before y before z. Shares within 10⁻⁵ of 0 or 1 become 0 or 1.
 class GaussianSpread {
  public:
-  /// How many standard deviations the Gaussian reaches.
+  /// The reach of the Gaussian, in standard deviations.
   static constexpr double sigmas = 4;
 
-  /// `sigma_mm`: standard deviation along each axis; zero leaves an axis as it is.
+  /// `sigma_mm` is the standard deviation along each axis; zero does not blur along the axis.
   GaussianSpread(const openvdb::Vec3d& pitch_mm, const openvdb::Vec3d& sigma_mm);
 
-  /// How many voxels the Gaussian reaches along each axis.
+  /// Returns the reach of the Gaussian in voxels, along each axis.
   [[nodiscard]] openvdb::Coord reach() const;
 
-  /// The shares over `core`: a fog volume, canonical, active where not zero.
-  /// @param solid   active and true where printed; what lies outside `box` is empty
-  /// @param box     of the lattice
-  /// @param valid   the layers of `solid` that are there: the core and the reach, cut at the box
+  /// Returns the shares over `core`: a canonical fog volume, active where it is not zero.
+  /// \param solid  active and true where printed; empty outside `box`
+  /// \param box  of the lattice
+  /// \param valid  the layers of `solid` that exist: the core and the reach, limited to the box
   [[nodiscard]] openvdb::FloatGrid::Ptr run(const openvdb::BoolGrid& solid,
                                             const openvdb::CoordBBox& box, ZRange core,
                                             ZRange valid) const;
 
-  /// The weights along an axis, of the voxels from −reach to +reach.
+  /// The weights along an axis for the voxels from −reach to +reach.
   [[nodiscard]] const std::vector<float>& weights(int axis) const {
     return weights_[static_cast<std::size_t>(axis)];
   }
@@ -43,7 +46,8 @@ class GaussianSpread {
   std::array<std::vector<float>, 3> weights_;
 };
 
-/// An empty grid `printed`: the share of material, 0 … 1, at least ½ within the print.
+/// Returns an empty grid `printed`: the share of material, 0 … 1, which is at least ½ within the
+/// print.
 openvdb::FloatGrid::Ptr makePrintedGrid(const openvdb::math::Transform& transform);
 
 }  // namespace vdbdither

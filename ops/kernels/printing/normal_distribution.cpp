@@ -9,9 +9,10 @@ namespace vdbdither {
 double normalShare(double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); }
 
 double probit(double share) {
-  constexpr double least = 1e-12;
-  // The tail's formula of Abramowitz and Stegun, 26.2.23, then Newton's and Halley's steps.
-  const double tail = std::max(least, std::min(share, 1 - share));
+  constexpr double minimum = 1e-12;
+  // The formula for the tail of Abramowitz and Stegun, 26.2.23, then steps of Newton's and Halley's
+  // methods.
+  const double tail = std::max(minimum, std::min(share, 1 - share));
   const double t = std::sqrt(-2 * std::log(tail));
   const double rough = t - (2.515517 + t * (0.802853 + t * 0.010328)) /
                                (1 + t * (1.432788 + t * (0.189269 + t * 0.001308)));

@@ -2,10 +2,10 @@
 
 namespace vdbdither {
 
-/// Φ(x), the share of the standard normal distribution below x.
+/// Returns Φ(x), the share of the standard normal distribution below x.
 double normalShare(double x);
 
-/// The inverse of Φ. What is not within (10⁻¹², 1 − 10⁻¹²) counts as the nearer of these.
+/// Returns the inverse of Φ. `share` is clamped to [10⁻¹², 1 − 10⁻¹²].
 double probit(double share);
 
 }  // namespace vdbdither

@@ -27,11 +27,6 @@ using test::volumeOf;
 
 const Vec3d mimaki_mm(0.042, 0.084, 0.022);
 
-void append(Mesh& mesh, const SurfacePiece& piece) {
-  mesh.vertices.insert(mesh.vertices.end(), piece.vertices.begin(), piece.vertices.end());
-  mesh.triangles.insert(mesh.triangles.end(), piece.triangles.begin(), piece.triangles.end());
-}
-
 /// The mesh of a grid that comes in pieces of `height` layers. Fails where a piece has triangles at
 /// vertices that were to be forgotten.
 template <typename GridPtr>

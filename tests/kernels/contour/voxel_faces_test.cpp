@@ -18,14 +18,10 @@ using openvdb::Vec3d;
 Mesh facesOf(const BoolGrid& grid, const Lattice& lattice) {
   VoxelFaces faces(lattice);
   Mesh mesh;
-  const auto take = [&](const SurfacePiece& piece) {
-    mesh.vertices.insert(mesh.vertices.end(), piece.vertices.begin(), piece.vertices.end());
-    mesh.triangles.insert(mesh.triangles.end(), piece.triangles.begin(), piece.triangles.end());
-  };
   int z = lattice.box.min().z();
   for (BitLayer& layer : bitLayers(grid, faces.frame(), {z, lattice.box.max().z() + 1}))
-    take(faces.add(std::move(layer), z++));
-  take(faces.finish());
+    append(mesh, faces.add(std::move(layer), z++));
+  append(mesh, faces.finish());
   return mesh;
 }
 

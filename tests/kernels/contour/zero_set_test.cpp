@@ -2,11 +2,11 @@
 
 #include <cmath>
 #include <functional>
-#include <map>
 
 #include <gtest/gtest.h>
 
 #include "ops/kernels/distance/zero_set_distance.h"
+#include "tests/support/mesh_checks.h"
 #include "tests/support/volumes.h"
 
 namespace vdbdither {
@@ -45,29 +45,6 @@ FloatGrid::Ptr sampledField(const std::function<double(const Vec3d&)>& field, co
   return grid;
 }
 
-/// Every side of a triangle is met by others as often in one direction as in the other.
-bool isClosed(const Mesh& mesh) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
-  for (const Mesh::Triangle& t : mesh.triangles) {
-    for (std::size_t n = 0; n < 3; ++n) {
-      const std::uint32_t from = t[n];
-      const std::uint32_t to = t[(n + 1) % 3];
-      sides[{std::min(from, to), std::max(from, to)}] += from < to ? 1 : -1;
-    }
-  }
-  for (const auto& [side, count] : sides) {
-    if (count != 0) return false;
-  }
-  return !mesh.triangles.empty();
-}
-
-double volumeMm3(const Mesh& mesh) {
-  double volume = 0;
-  for (const Mesh::Triangle& t : mesh.triangles)
-    volume += mesh.vertices[t[0]].dot(mesh.vertices[t[1]].cross(mesh.vertices[t[2]])) / 6;
-  return volume;
-}
-
 const Vec3d centre(0.13, -0.21, 0.07);
 const double ball_mm3 = 4 * M_PI / 3;
 
@@ -79,8 +56,8 @@ TEST(ZeroSet, IsAClosedMeshThatFacesOutwardsUnderAnyMapAndDivision) {
     for (const int divisions : {1, 2, 3}) {
       const ZeroSet surface(grid, map, {}, divisions);
       const Mesh mesh = surface.triangles(-10, 10);
-      EXPECT_TRUE(isClosed(mesh));
-      EXPECT_NEAR(volumeMm3(mesh), ball_mm3, 0.01 * ball_mm3);
+      EXPECT_EQ(test::openSides(mesh), 0U);
+      EXPECT_NEAR(test::volumeOf(mesh), ball_mm3, 0.01 * ball_mm3);
       EXPECT_EQ(surface.cells(), static_cast<double>(mesh.vertices.size()));
       for (const Vec3d& vertex : mesh.vertices) ASSERT_LT(std::abs(ball(vertex)), 2e-3) << vertex;
     }
@@ -98,8 +75,8 @@ TEST(ZeroSet, ReadsValuesOfAnyUnitAndSense) {
     grid->tree().setValueOn(ijk, static_cast<float>(fog(map.transform(ijk.asVec3d()))));
   const ZeroSet surface(grid, map, {0.5F, true}, 2);
   const Mesh mesh = surface.triangles(-10, 10);
-  EXPECT_TRUE(isClosed(mesh));
-  EXPECT_NEAR(volumeMm3(mesh), ball_mm3, 0.01 * ball_mm3);
+  EXPECT_EQ(test::openSides(mesh), 0U);
+  EXPECT_NEAR(test::volumeOf(mesh), ball_mm3, 0.01 * ball_mm3);
   ZeroSet::Feet feet(surface);
   for (const double d_mm : {-0.2, -0.01, 0.0, 0.01, 0.2}) {
     // The foot is a little off the surface and beside the right one.
@@ -114,8 +91,8 @@ TEST(ZeroSet, SeesTheRimOfTiles) {
   grid->tree().addTile(2, Coord(0), 1.0F, true);
   const Mat4d map = mapOf(Vec3d(0.01), 0, {0, 0, 0});
   const Mesh mesh = ZeroSet(grid, map, {0.5F, true}, 1).triangles(-10, 10);
-  EXPECT_TRUE(isClosed(mesh));
-  EXPECT_NEAR(volumeMm3(mesh), std::pow(1.28, 3), 0.001);
+  EXPECT_EQ(test::openSides(mesh), 0U);
+  EXPECT_NEAR(test::volumeOf(mesh), std::pow(1.28, 3), 0.001);
 }
 
 TEST(ZeroSet, AStretchOfLayersHasWhatTheWholeHasThere) {
@@ -167,8 +144,8 @@ TEST(ZeroSetDistance, IsExactToAHundredthOfAVoxelAndTheSameForAnyCut) {
   EXPECT_GT(active, 10000);
 
   const auto again = ZeroSetDistance(surface, lattice, {1, 0}, 0.01);
-  for (int z = alignedToLeaves(lattice.layers()).begin; z < lattice.layers().end; z += 8) {
-    const auto slab = again.run(intersection({z, z + 8}, lattice.layers()));
+  for (const ZRange core : test::slabsOf(lattice.layers())) {
+    const auto slab = again.run(core);
     for (auto voxel = slab->cbeginValueOn(); voxel; ++voxel)
       ASSERT_EQ(*voxel, whole->tree().getValue(voxel.getCoord()));
   }

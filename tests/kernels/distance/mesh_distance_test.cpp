@@ -15,6 +15,7 @@
 #include "ops/kernels/leaf/tie.h"
 #include "ops/kernels/mesh/winding_number.h"
 #include "tests/support/shapes.h"
+#include "tests/support/volumes.h"
 #include "vdbdither/model/layers.h"
 
 namespace vdbdither {
@@ -282,10 +283,8 @@ TEST(MeshDistance, SlabsOfAnyHeightGiveTheWhole) {
     for (const int height : {8, 16, 40}) {
       std::vector<Layers> pieces;
       const ZRange all = alignedToLeaves(lattice.layers());
-      for (int begin = all.begin; begin < all.end; begin += height) {
-        const ZRange range{begin, begin + height};
+      for (const ZRange range : test::slabsOf(all, height))
         pieces.push_back({field.run(range).surface, range});
-      }
       const auto joined =
           openvdb::gridConstPtrCast<openvdb::FloatGrid>(joinLayers(pieces, all))->deepCopy();
       openvdb::tools::prune(joined->tree());

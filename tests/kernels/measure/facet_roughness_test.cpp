@@ -99,9 +99,9 @@ TEST(FacetRoughness, LeavesSmallFacetsOut) {
   const ClosestPoints reference(test::boxMesh({0, 0, 0}, {0.5, 2, 2}));
   const SurfaceErrors errors = surfaceErrors(reference.mesh(), reference, 0.1);
   RoughnessRules rules;
-  rules.least_area_mm2 = 2;
+  rules.minimum_area_mm2 = 2;
   EXPECT_EQ(facetRoughness(errors, reference, rules).size(), 2U);
-  rules.most_facets = 1;
+  rules.maximum_facets = 1;
   EXPECT_EQ(facetRoughness(errors, reference, rules).size(), 1U);
 }
 

@@ -17,8 +17,8 @@ TEST(GridSummary, CountsVoxelsOfLeavesAndTiles) {
   const GridSummary summary = gridSummary(*grid);
   EXPECT_EQ(summary.active_voxels, 514U);
   EXPECT_EQ(summary.box, CoordBBox(Coord(-2, 0, 0), Coord(15, 7, 7)));
-  EXPECT_EQ(summary.least[0], -4);
-  EXPECT_EQ(summary.greatest[0], 3);
+  EXPECT_EQ(summary.minimum[0], -4);
+  EXPECT_EQ(summary.maximum[0], 3);
   EXPECT_EQ(summary.leaves, 1U);
   EXPECT_EQ(summary.counts, (std::map<std::int64_t, std::uint64_t>{{-4, 1}, {3, 513}}));
 }
@@ -28,8 +28,8 @@ TEST(GridSummary, VectorsHaveARangeForEachComponent) {
   grid->tree().setValue(Coord(0), openvdb::Vec3s(1, -2, 0));
   grid->tree().setValue(Coord(1), openvdb::Vec3s(-3, 5, 0.5F));
   const GridSummary summary = gridSummary(*grid);
-  EXPECT_EQ(summary.least, openvdb::Vec3d(-3, -2, 0));
-  EXPECT_EQ(summary.greatest, openvdb::Vec3d(1, 5, 0.5));
+  EXPECT_EQ(summary.minimum, openvdb::Vec3d(-3, -2, 0));
+  EXPECT_EQ(summary.maximum, openvdb::Vec3d(1, 5, 0.5));
 }
 
 TEST(GridSummary, LayersAddUpAndEmptyOnesAddNothing) {
@@ -42,8 +42,8 @@ TEST(GridSummary, LayersAddUpAndEmptyOnesAddNothing) {
   all.add(gridSummary(*openvdb::FloatGrid::create(7)));
   all.add(gridSummary(*high));
   EXPECT_EQ(all.active_voxels, 2U);
-  EXPECT_EQ(all.least[0], -1);
-  EXPECT_EQ(all.greatest[0], 2);
+  EXPECT_EQ(all.minimum[0], -1);
+  EXPECT_EQ(all.maximum[0], 2);
   EXPECT_EQ(all.box, CoordBBox(Coord(0), Coord(0, 0, 9)));
 }
 

@@ -12,8 +12,8 @@ namespace {
 
 using Bins = std::vector<std::tuple<double, double, std::uint64_t>>;
 
-Bins binsOf(const std::vector<double>& values, int most, int least_exponent) {
-  Histogram histogram(most, least_exponent);
+Bins binsOf(const std::vector<double>& values, int most, int minimum_exponent) {
+  Histogram histogram(most, minimum_exponent);
   for (const double value : values) histogram.add(value, 1);
   Bins bins;
   for (const Histogram::Bin& bin : histogram.bins()) bins.emplace_back(bin.from, bin.to, bin.count);

@@ -31,7 +31,7 @@ TEST(SurfaceErrors, OfAnOffsetBoxAreTheOffsetOnFacesAndTheDiagonalAtCorners) {
       statisticsByArea(surfaceErrors(test::boxMesh(Vec3d(0.1), Vec3d(9.9)), reference, 0.5));
   EXPECT_NEAR(inward.bias_mm, -0.1, 1e-12);
   EXPECT_NEAR(inward.mean_mm, 0.1, 1e-12);
-  EXPECT_NEAR(inward.most_mm, 0.1, 1e-12);
+  EXPECT_NEAR(inward.maximum_mm, 0.1, 1e-12);
 }
 
 TEST(SurfaceErrors, SmallTrianglesGiveAThirdOfTheirAreaToEachCorner) {
@@ -65,7 +65,7 @@ TEST(ErrorStatistics, AreThoseOfAHandfulOfErrors) {
   EXPECT_DOUBLE_EQ(by_area.bias_mm, (-0.3 + 0.1 + 1.2 + 0.8) / 10);
   EXPECT_DOUBLE_EQ(by_area.mean_mm, (0.3 + 0.1 + 1.2 + 0.8) / 10);
   EXPECT_DOUBLE_EQ(by_area.rms_mm, std::sqrt((0.09 + 0.01 + 6 * 0.04 + 2 * 0.16) / 10));
-  EXPECT_EQ(by_area.most_mm, 0.4);
+  EXPECT_EQ(by_area.maximum_mm, 0.4);
   EXPECT_EQ(by_area.percentile(0), 0.1);
   EXPECT_EQ(by_area.percentile(10), 0.1);
   EXPECT_EQ(by_area.percentile(50), 0.2);

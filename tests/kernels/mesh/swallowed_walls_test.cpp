@@ -93,7 +93,7 @@ void expectDistancesToTheUnion(const std::vector<Box>& boxes) {
     const Mesh mesh = meshOf(moved);
     expectDistancesToTheUnion(moved, mesh, away);
     MeshRepairs repairs;
-    expectDistancesToTheUnion(moved, repaired(mesh, repairs), away);
+    expectDistancesToTheUnion(moved, repaired(derived(mesh), repairs).mesh, away);
   }
 }
 

@@ -18,26 +18,6 @@ using openvdb::Vec3d;
 
 constexpr std::size_t few_leaves = 60'000;
 
-/// Every triangle by itself, drawn towards its middle by `gap_mm`.
-Mesh pulledApart(const Mesh& mesh, double gap_mm) {
-  Mesh loose;
-  for (const Mesh::Triangle& t : mesh.triangles) {
-    const Vec3d middle = (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3;
-    const auto first = static_cast<std::uint32_t>(loose.vertices.size());
-    for (const std::uint32_t v : t) {
-      const Vec3d inwards = middle - mesh.vertices[v];
-      loose.vertices.push_back(mesh.vertices[v] + inwards * (gap_mm / inwards.length()));
-    }
-    loose.triangles.push_back({first, first + 1, first + 2});
-  }
-  return loose;
-}
-
-Mesh turned(Mesh mesh) {
-  for (Mesh::Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
-  return mesh;
-}
-
 Mesh randomTriangles(unsigned seed, int count) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(0, 10);
@@ -76,7 +56,7 @@ double shareOfWrongSides(const Mesh& loose, const Mesh& made, int points, double
 
 TEST(WindingSurface, ACubePulledApartComesBack) {
   const Mesh cube = test::boxMesh({1, 2, 3}, {11, 12, 13});
-  const WindingSurface surface = windingSurface(pulledApart(cube, 0.05), {}, few_leaves);
+  const WindingSurface surface = windingSurface(test::pulledApart(cube, 0.05), {}, few_leaves);
   EXPECT_FALSE(surface.turned);
   EXPECT_EQ(test::openSides(surface.mesh), 0U);
   EXPECT_NEAR(test::volumeOf(surface.mesh), 1000, 1);
@@ -89,7 +69,7 @@ TEST(WindingSurface, ACubePulledApartComesBack) {
 
 TEST(WindingSurface, ASpherePulledApartComesBack) {
   const Mesh sphere = test::sphereMesh({0, 0, 0}, 5, 12);
-  const WindingSurface surface = windingSurface(pulledApart(sphere, 0.02), {}, few_leaves);
+  const WindingSurface surface = windingSurface(test::pulledApart(sphere, 0.02), {}, few_leaves);
   EXPECT_EQ(test::openSides(surface.mesh), 0U);
   EXPECT_NEAR(test::volumeOf(surface.mesh) / test::volumeOf(sphere), 1, 0.002);
   for (const Vec3d& v : surface.mesh.vertices) ASSERT_NEAR(v.length(), 4.93, 0.1) << v;
@@ -105,7 +85,7 @@ TEST(WindingSurface, OfAClosedMeshIsTheMesh) {
 TEST(WindingSurface, KeepsWallsThinnerThanACoarseCell) {
   // 100 mm long, 0.4 mm thick, in no plane of the cells.
   const Mesh wall = test::transformed(test::boxMesh({0, 0, 0}, {100, 40, 0.4}), {20, 30, 10}, {});
-  const WindingSurface surface = windingSurface(pulledApart(wall, 0.01), {}, 400'000);
+  const WindingSurface surface = windingSurface(test::pulledApart(wall, 0.01), {}, 400'000);
   EXPECT_EQ(test::openSides(surface.mesh), 0U);
   EXPECT_NEAR(test::volumeOf(surface.mesh), 1600, 16);
 }
@@ -130,9 +110,9 @@ TEST(WindingSurface, FillsAHoleWhereTheNumberIsAHalf) {
 }
 
 TEST(WindingSurface, TurnsTrianglesThatAllFaceInwards) {
-  const Mesh cube = pulledApart(test::boxMesh({0, 0, 0}, {3, 3, 3}), 0.01);
+  const Mesh cube = test::pulledApart(test::boxMesh({0, 0, 0}, {3, 3, 3}), 0.01);
   const WindingSurface as_it_is = windingSurface(cube, {}, few_leaves);
-  const WindingSurface inwards = windingSurface(turned(cube), {}, few_leaves);
+  const WindingSurface inwards = windingSurface(test::insideOut(cube), {}, few_leaves);
   EXPECT_FALSE(as_it_is.turned);
   EXPECT_TRUE(inwards.turned);
   EXPECT_NEAR(test::volumeOf(inwards.mesh), test::volumeOf(as_it_is.mesh), 1e-6);
@@ -165,7 +145,7 @@ TEST(WindingSurface, IsTheSameForAnyNumberOfThreads) {
 TEST(WindingSurface, TellsHowFarItIs) {
   double last = 0;
   windingSurface(
-      pulledApart(test::boxMesh({0, 0, 0}, {3, 3, 3}), 0.01),
+      test::pulledApart(test::boxMesh({0, 0, 0}, {3, 3, 3}), 0.01),
       [&](double fraction) {
         EXPECT_GE(fraction, last);
         EXPECT_LE(fraction, 1);

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/volumes.h"
+
 namespace vdbdither {
 namespace {
 
@@ -101,14 +103,13 @@ TEST(DepthBands, ReadNothingBeyondTheirReach) {
   const auto whole = valueByDepth(*solid, pitch, box, {0, 64}, {0, 64}, bands, 2);
   const int reach = depthReach(bands, pitch.z());
   EXPECT_EQ(reach, 9);
-  for (int z = 0; z < 64; z += 8) {
-    const ZRange valid = intersection({z - reach, z + 8 + reach}, {0, 64});
+  for (const ZRange core : test::slabsOf({0, 64})) {
+    const ZRange valid = intersection({core.begin - reach, core.end + reach}, {0, 64});
     const auto spoiled = solid->deepCopy();
-    if (valid.begin > 0)
-      spoiled->fill(CoordBBox(Coord(0, 0, 0), Coord(30, 15, valid.begin - 1)), z % 16 == 0,
-                    z % 16 == 0);
-    const auto part = valueByDepth(*spoiled, pitch, box, {z, z + 8}, valid, bands, 2);
-    for (auto voxel = CoordBBox(Coord(0, 0, z), Coord(30, 15, z + 7)).begin(); voxel; ++voxel) {
+    const bool rubbish = core.begin % 16 == 0;
+    if (valid.begin > 0) spoiled->fill(test::inLayers(box, {0, valid.begin}), rubbish, rubbish);
+    const auto part = valueByDepth(*spoiled, pitch, box, core, valid, bands, 2);
+    for (auto voxel = test::inLayers(box, core).begin(); voxel; ++voxel) {
       ASSERT_EQ(part->tree().getValue(*voxel), whole->tree().getValue(*voxel)) << *voxel;
     }
   }

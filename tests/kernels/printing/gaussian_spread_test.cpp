@@ -83,14 +83,10 @@ TEST(GaussianSpread, SlabsAndWhatLiesBeyondItsReachChangeNoBit) {
   const GaussianSpread spread(mimaki_mm, Vec3d(0.05));
   const int reach = spread.reach().z();
   const auto whole = spread.run(*solid, box, {-9, 51}, {-9, 51});
-  for (int z = -16; z < 51; z += 8) {
-    const ZRange core = intersection({z, z + 8}, {-9, 51});
+  for (const ZRange core : test::slabsOf({-9, 51})) {
     const ZRange valid = intersection({core.begin - reach, core.end + reach}, {-9, 51});
     const auto slab = spread.run(*solid, box, core, valid);
-    CoordBBox layers = box;
-    layers.min().z() = core.begin;
-    layers.max().z() = core.end - 1;
-    for (auto ijk = layers.begin(); ijk; ++ijk)
+    for (auto ijk = test::inLayers(box, core).begin(); ijk; ++ijk)
       ASSERT_EQ(slab->tree().getValue(*ijk), whole->tree().getValue(*ijk)) << *ijk;
     const CoordBBox active = slab->evalActiveVoxelBoundingBox();
     EXPECT_TRUE(active.empty() || (active.min().z() >= core.begin && active.max().z() < core.end));
