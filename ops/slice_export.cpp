@@ -41,8 +41,8 @@ class SliceExport : public Sink {
     options.integer("first", names_.first, {0, 1000000}, "Number of the lowest slice");
     options.flag(
         "keep-blank", keep_blank_,
-        "Writes the blank slices below and above the part too, as the pieces of a job need "
-        "to be numbered alike. Formats with more grids than the sliced one always have "
+        "Writes the blank slices below and above the part too, which pieces of a job need to be "
+        "numbered alike; exr always has them");
         "them");
     options.integer("padding", stack_.frame.padding, {0, 100000},
                     "Empty voxels added on each side in x and y");
