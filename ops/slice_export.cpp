@@ -43,7 +43,6 @@ class SliceExport : public Sink {
         "keep-blank", keep_blank_,
         "Writes the blank slices below and above the part too, which pieces of a job need to be "
         "numbered alike; exr always has them");
-        "them");
     options.integer("padding", stack_.frame.padding, {0, 100000},
                     "Empty voxels added on each side in x and y");
     options.flag(
