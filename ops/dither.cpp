@@ -116,7 +116,7 @@ class Dither : public Filter {
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
-    const ShapeDither::Layers reach = dither_.reach(has_normals_);
+    const ShapeDither::Reach reach = dither_.reach(has_normals_);
     std::vector<Read> reads{{surface_grid, Reach::stencil(reach.surface)}};
     if (has_normals_ && dither_.amplitude != 0)
       reads.push_back({normal_grid, Reach::stencil(reach.normals)});

@@ -318,7 +318,7 @@ class Measure : public Sink {
     name_ = chosenSurfaceGrid(there, measurement_.surfaceGrid().grid);
     lattice_ = in.lattice;
     surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
-    components_.emplace(surface_->frame());
+    components_.emplace(surface_->layout());
     measurement_.begin(&lattice_, report());
   }
 

@@ -77,7 +77,7 @@ class Offset : public Filter {
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
-    const SurfaceOffset::Layers reach = offset_.reach();
+    const SurfaceOffset::Reach reach = offset_.reach();
     std::vector<Read> reads{{surface_grid, Reach::stencil(reach.surface)}};
     if (!grid_.empty()) reads.push_back({grid_, Reach::stencil(reach.heights)});
     return reads;

@@ -10,7 +10,7 @@
 #include "io/file/staged_output.h"
 #include "io/image/exr.h"
 #include "io/image/picture.h"
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "ops/kernels/contour/grid_surface.h"
@@ -85,7 +85,7 @@ class SurfacePicture {
     camera_.pixel_mm = view_.pixel_mm;
     camera_.distance_mm = projection_ == Projection::perspective ? view_.distance_mm : 0;
     StagedOutput::check(file_, StagedOutput::Kind::file, overwrite_.overwrite);
-    if (!frame_file_.empty()) frame(camera_, readMeshOf(frame_file_, reporter), margin_);
+    if (!frame_file_.empty()) fit(camera_, readMeshOf(frame_file_, reporter), margin_);
   }
 
   [[nodiscard]] const SurfaceGridOption& surfaceGrid() const { return surface_grid_; }
@@ -99,7 +99,7 @@ class SurfacePicture {
   }
 
   void finish(Mesh mesh, Reporter& reporter) {
-    if (frame_file_.empty()) frame(camera_, mesh, margin_);
+    if (frame_file_.empty()) fit(camera_, mesh, margin_);
     reporter.count("triangles", static_cast<double>(mesh.triangles.size()));
     const RayScene scene(mesh);
     mesh = {};
@@ -131,7 +131,7 @@ class SurfacePicture {
     }
     Camera camera = camera_;
     try {
-      frame(camera, corners, 0);
+      fit(camera, corners, 0);
     } catch (const DataError&) {
       return std::nullopt;
     }

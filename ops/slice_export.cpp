@@ -11,7 +11,7 @@
 
 #include "io/profile/material_table.h"
 #include "io/stack/slice_format.h"
-#include "io/stack/slice_runs.h"
+#include "io/stack/slice_spans.h"
 #include "io/stack/stack_files.h"
 #include "io/stack/stack_writer.h"
 #include "vdbdither/engine/operator.h"
@@ -43,12 +43,12 @@ class SliceExport : public Sink {
         "keep-blank", keep_blank_,
         "Writes the blank slices below and above the part too, which pieces of a job need to be "
         "numbered alike; exr always has them");
-    options.integer("padding", stack_.frame.padding, {0, 100000},
+    options.integer("padding", stack_.layout.padding, {0, 100000},
                     "Empty voxels added on each side in x and y");
     options.flag(
-        "flip-x", stack_.frame.flip_x,
+        "flip-x", stack_.layout.flip_x,
         "Mirrors left to right; by default a slice is seen from above, with x to the right");
-    options.flag("flip-y", stack_.frame.flip_y,
+    options.flag("flip-y", stack_.layout.flip_y,
                  "Mirrors top to bottom; by default the maximum y is the top row");
     options.text("background", background_, "COLOUR",
                  "Colour of empty voxels in " + sliceFormatNames([](const auto& format) {
@@ -70,8 +70,8 @@ class SliceExport : public Sink {
     if (names_.prefix.find('/') != std::string::npos)
       throw UsageError("--prefix: '" + names_.prefix + "' must not hold a '/'");
     StackOutput::check(folder_, overwrite_.overwrite);
-    if (in.lattice.box.dim().x() + std::int64_t{2} * stack_.frame.padding > 1 << 24 ||
-        in.lattice.box.dim().y() + std::int64_t{2} * stack_.frame.padding > 1 << 24) {
+    if (in.lattice.box.dim().x() + std::int64_t{2} * stack_.layout.padding > 1 << 24 ||
+        in.lattice.box.dim().y() + std::int64_t{2} * stack_.layout.padding > 1 << 24) {
       throw UsageError("slices would be more than 16777216 voxels wide");
     }
     encoder_->plan(stack_, in.grids);
@@ -142,7 +142,7 @@ class SliceExport : public Sink {
     std::istringstream history(metadata(history_key));
     for (std::string line; std::getline(history, line);) stack_.history.push_back(line);
     stack_.lattice = schema_.lattice;
-    stack_.frame.box = schema_.lattice.box;
+    stack_.layout.box = schema_.lattice.box;
   }
 
   void planMaterials() {
@@ -190,12 +190,12 @@ class SliceExport : public Sink {
     }
   }
 
-  [[nodiscard]] std::vector<RunImage> slices(const Slab& in, ZRange layers) const {
+  [[nodiscard]] std::vector<SpanImage> slices(const Slab& in, ZRange layers) const {
     return stack_.grid == material_grid
-               ? sliceRuns(*findGrid<openvdb::Int32Grid>(in.grids, material_grid), stack_.frame,
-                           layers)
-               : sliceRuns(*findGrid<openvdb::BoolGrid>(in.grids, solid_grid), stack_.frame,
-                           layers);
+               ? sliceSpans(*findGrid<openvdb::Int32Grid>(in.grids, material_grid), stack_.layout,
+                            layers)
+               : sliceSpans(*findGrid<openvdb::BoolGrid>(in.grids, solid_grid), stack_.layout,
+                            layers);
   }
 
   std::string folder_;

@@ -6,7 +6,7 @@
 #include <tbb/parallel_for.h>
 
 #include "io/profile/material_table.h"
-#include "io/stack/slice_runs.h"
+#include "io/stack/slice_spans.h"
 #include "io/stack/stack_reader.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
@@ -62,10 +62,10 @@ class SliceImport : public Source {
     const auto material = std::make_shared<openvdb::Int32Tree>(0);
     for (ZRange rows = alignedToLeaves(core); rows.begin < rows.end; rows.begin += leaf_layers) {
       const ZRange layers = intersection({rows.begin, rows.begin + leaf_layers}, core);
-      std::vector<RunImage> images(static_cast<std::size_t>(std::max(0, layers.size())));
+      std::vector<SpanImage> images(static_cast<std::size_t>(std::max(0, layers.size())));
       tbb::parallel_for(layers.begin, layers.end,
                         [&](int z) { images[z - layers.begin] = stack_->layer(z); });
-      material->merge(gridOfRuns(images, stack_->manifest().frame, layers)->tree());
+      material->merge(gridOfSpans(images, stack_->manifest().layout, layers)->tree());
     }
     openvdb::tools::prune(*material);
     const auto typed = [&](const char* name, const auto& tree, auto grid) {
@@ -111,15 +111,15 @@ class SliceImport : public Source {
     schema.footprint = Footprint{fullest, leaves, leaves}.scaled(lean);
   }
 
-  /// The squares of eight by eight pixels that some run ends in.
-  static double leavesCrossed(const RunImage& image) {
+  /// The squares of eight by eight pixels that some span ends in.
+  static double leavesCrossed(const SpanImage& image) {
     double leaves = 0;
     std::vector<bool> crossed;
     for (std::uint32_t y = 0; y < image.height; ++y) {
       if (y % leaf_layers == 0) crossed.assign(image.width / leaf_layers + 1, false);
-      for (const Run& run : image.row(y)) {
-        if (run.end == image.width) continue;
-        const std::uint32_t square = run.end / leaf_layers;
+      for (const Span& span : image.row(y)) {
+        if (span.end == image.width) continue;
+        const std::uint32_t square = span.end / leaf_layers;
         if (!crossed[square]) ++leaves;
         crossed[square] = true;
       }

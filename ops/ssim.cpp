@@ -12,7 +12,7 @@
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
 #include "io/image/picture.h"
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 #include "ops/kernels/picture/picture_similarity.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/engine/tool.h"
@@ -25,35 +25,35 @@ namespace {
 using nlohmann::ordered_json;
 
 /// The channels over a grey background, sRGB-coded, 0 to 1.
-ColourPlanes channelsOf(const Picture& picture, double background) {
-  ColourPlanes planes;
+ColourChannels channelsOf(const Picture& picture, double background) {
+  ColourChannels channels;
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    planes[channel] = Plane(static_cast<int>(picture.width), static_cast<int>(picture.height));
+    channels[channel] = Channel(static_cast<int>(picture.width), static_cast<int>(picture.height));
     for (std::size_t i = 0; i < picture.pixels.size(); ++i) {
       const double value = (picture.pixels[i] >> 8 * channel & 255) / 255.0;
       const double cover = (picture.pixels[i] >> 24) / 255.0;
-      planes[channel].values[i] = cover * value + (1 - cover) * background;
+      channels[channel].values[i] = cover * value + (1 - cover) * background;
     }
   }
-  return planes;
+  return channels;
 }
 
 /// The luma of ITU-R BT.601.
-Plane greyOf(const ColourPlanes& planes) {
-  Plane grey(planes[0].width, planes[0].height);
+Channel greyOf(const ColourChannels& channels) {
+  Channel grey(channels[0].width, channels[0].height);
   for (std::size_t i = 0; i < grey.values.size(); ++i)
-    grey.values[i] =
-        0.299 * planes[0].values[i] + 0.587 * planes[1].values[i] + 0.114 * planes[2].values[i];
+    grey.values[i] = 0.299 * channels[0].values[i] + 0.587 * channels[1].values[i] +
+                     0.114 * channels[2].values[i];
   return grey;
 }
 
-double meanOver(const Plane& map, const std::vector<std::size_t>& pixels) {
+double meanOver(const Channel& map, const std::vector<std::size_t>& pixels) {
   double sum = 0;
   for (const std::size_t pixel : pixels) sum += map.values[pixel];
   return sum / static_cast<double>(pixels.size());
 }
 
-std::vector<std::uint8_t> greyPng(const Plane& map) {
+std::vector<std::uint8_t> greyPng(const Channel& map) {
   Picture picture{
       static_cast<std::uint32_t>(map.width), static_cast<std::uint32_t>(map.height), {}};
   for (const double value : map.values) {
@@ -97,14 +97,14 @@ class Ssim : public Tool {
                       "; only pictures of one size can be compared");
     }
     const std::vector<std::size_t> object = objectPixels(reference);
-    const ColourPlanes a = channelsOf(reference, background_);
-    const ColourPlanes b = channelsOf(picture, background_);
-    const Plane grey_a = greyOf(a);
-    const Plane grey_b = greyOf(b);
-    const Plane plain = structuralSimilarity(grey_a, grey_b);
-    const Plane seen = structuralSimilarity(seenByTheEye(grey_a, pixels_per_degree),
-                                            seenByTheEye(grey_b, pixels_per_degree));
-    const Plane flip = flipDifference(a, b, pixels_per_degree);
+    const ColourChannels a = channelsOf(reference, background_);
+    const ColourChannels b = channelsOf(picture, background_);
+    const Channel grey_a = greyOf(a);
+    const Channel grey_b = greyOf(b);
+    const Channel plain = structuralSimilarity(grey_a, grey_b);
+    const Channel seen = structuralSimilarity(seenByTheEye(grey_a, pixels_per_degree),
+                                              seenByTheEye(grey_b, pixels_per_degree));
+    const Channel flip = flipDifference(a, b, pixels_per_degree);
     const std::array<double, 3> means{meanOver(plain, object), meanOver(seen, object),
                                       meanOver(flip, object)};
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/profile/material_table.h"
-#include "io/stack/slice_runs.h"
+#include "io/stack/slice_spans.h"
 #include "ops/kernels/measure/histogram.h"
 #include "ops/kernels/measure/surface_area.h"
 #include "vdbdither/engine/operator.h"
@@ -30,19 +30,19 @@ struct Tally {
 /// Tallies layers as they come, rising.
 class LayerTally {
  public:
-  void add(RunImage&& layer) {
+  void add(SpanImage&& layer) {
     for (std::uint32_t y = 0; y < layer.height; ++y) {
       std::uint32_t begin = 0;
       std::uint32_t before = 0;
-      for (const Run& run : layer.row(y)) {
-        if (run.value) tallies_[run.value].voxels += run.end - begin;
-        meet(before, run.value, 0, 1);
-        begin = run.end;
-        before = run.value;
+      for (const Span& span : layer.row(y)) {
+        if (span.value) tallies_[span.value].voxels += span.end - begin;
+        meet(before, span.value, 0, 1);
+        begin = span.end;
+        before = span.value;
       }
       meet(before, 0, 0, 1);
-      meetRows(y > 0 ? layer.row(y - 1) : std::span<const Run>(), layer.row(y), 1);
-      meetRows(below_.height ? below_.row(y) : std::span<const Run>(), layer.row(y), 2);
+      meetRows(y > 0 ? layer.row(y - 1) : std::span<const Span>(), layer.row(y), 1);
+      meetRows(below_.height ? below_.row(y) : std::span<const Span>(), layer.row(y), 2);
     }
     if (layer.height) meetRows(layer.row(layer.height - 1), {}, 1);
     below_ = std::move(layer);
@@ -62,9 +62,9 @@ class LayerTally {
     tallies_[a ? a : b].faces[axis] += faces;
   }
 
-  /// Rows that lie face to face; one without runs is empty.
-  void meetRows(std::span<const Run> a, std::span<const Run> b, int axis) {
-    const Run nothing{a.empty() ? b.back().end : a.back().end, 0};
+  /// Rows that lie face to face; one without spans is empty.
+  void meetRows(std::span<const Span> a, std::span<const Span> b, int axis) {
+    const Span nothing{a.empty() ? b.back().end : a.back().end, 0};
     if (a.empty()) a = {&nothing, 1};
     if (b.empty()) b = {&nothing, 1};
     std::uint32_t begin = 0;
@@ -77,7 +77,7 @@ class LayerTally {
     }
   }
 
-  RunImage below_;
+  SpanImage below_;
   std::map<std::uint32_t, Tally> tallies_;
 };
 
@@ -129,18 +129,19 @@ class Stats : public Sink {
   }
 
   void write(const Slab& in) override {
-    const SliceFrame frame{lattice_.box, 0, false, false};
-    // Few layers at a time, as their runs are not small.
+    const SliceLayout layout{lattice_.box, 0, false, false};
+    // Few layers at a time, as their spans are not small.
     for (int z = in.core.begin; z < in.core.end;) {
       const int end = std::min(in.core.end, alignedToLeaves({z, z + 1}).end);
       if (measures(material_grid)) {
         const auto grid = findGrid<openvdb::Int32Grid>(in.grids, material_grid);
-        for (RunImage& layer : sliceRuns(*grid, frame, {z, end}))
+        for (SpanImage& layer : sliceSpans(*grid, layout, {z, end}))
           by_material_.add(std::move(layer));
       }
       if (measures(solid_grid)) {
         const auto grid = findGrid<openvdb::BoolGrid>(in.grids, solid_grid);
-        for (RunImage& layer : sliceRuns(*grid, frame, {z, end})) of_solid_.add(std::move(layer));
+        for (SpanImage& layer : sliceSpans(*grid, layout, {z, end}))
+          of_solid_.add(std::move(layer));
       }
       z = end;
     }

@@ -30,7 +30,7 @@ constexpr std::array<Choice<VdbCodec>, 3> codecs{
      {VdbCodec::none, "none", "All voxels of each leaf, uncompressed"}}};
 
 /// All slabs of a grid in one, in canonical form; `pieces` is empty then.
-GridConstPtr whole(std::vector<Layers>& pieces, ZRange layers) {
+GridConstPtr whole(std::vector<GridLayers>& pieces, ZRange layers) {
   const GridConstPtr joined = joinLayers(pieces, layers);
   if (joined == pieces.front().grid) {
     pieces.clear();
@@ -155,7 +155,7 @@ class WriteOperator : public Sink {
   bool begun_ = false;
   std::optional<StagedOutput> output_;
   ZRange written_;
-  std::map<std::string, std::vector<Layers>> pieces_;
+  std::map<std::string, std::vector<GridLayers>> pieces_;
 };
 
 }  // namespace

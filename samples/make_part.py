@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Make the sample part: a game token of 20 x 20 x 14 mm, as a binary STL.
 
-It has what a printer's lattice spoils: twelve petals whose slopes run from 0.5 to 5 degrees, a wall
-with two degrees of draft, a dome that fades into a face tilted by 1.5 degrees, and on that a star with
-crisp edges and ten facets of four degrees. The part is closed and manifold, and comes out the same
-bytes every time.
+The part has the shapes on which voxels leave visible steps: twelve petals with slopes from 0.5 to 5
+degrees, a wall with two degrees of draft, a dome that blends into a face tilted by 1.5 degrees, and on
+this face a star with sharp edges and ten facets of four degrees. The mesh is closed and manifold. The
+script writes the same bytes every time.
 
     python3 make_part.py token.stl
 """
@@ -26,34 +26,34 @@ STAR_RIDGE = 0.12  # from the outline to the centre
 
 
 def face(x, y):
-    """Height of the tilted face."""
+    """Returns the height of the tilted face."""
     return FACE_HEIGHT + TILT * (0.6 * x - 0.8 * y)
 
 
 def smooth_minimum(a, b):
-    """The smaller of the two, rounded off where they differ by less than BLEND."""
+    """Returns the smaller value, rounded off where the two differ by less than BLEND."""
     near = max(BLEND - abs(a - b), 0.0) / BLEND
     return min(a, b) - near * near * BLEND / 4
 
 
 def star(angle):
-    """Distance from the axis to the outline of a five-pointed star with a tip at +y."""
+    """Returns the distance from the axis to the outline of a five-pointed star with a tip at +y."""
     step = math.pi / 5
     corner = math.floor((angle - math.pi / 2) / step + 1e-9)
     one, other = (STAR_TIP, STAR_NOTCH) if corner % 2 == 0 else (STAR_NOTCH, STAR_TIP)
     within = angle - math.pi / 2 - corner * step
-    # Where the ray meets the straight edge between the two corners.
+    # The ray meets the straight edge between the two corners here.
     return (one * other * math.sin(step)
             / (one * math.sin(within) + other * math.sin(step - within)))
 
 
 def crest(angle):
-    """1 along the middle of a petal, 0 between two."""
+    """Returns 1 along the middle of a petal and 0 between two petals."""
     return (1 + math.cos(PETALS * angle)) / 2
 
 
 def rings():
-    """Functions of the angle that give (radius, height), from the rim of the bottom to the star's."""
+    """Returns functions of the angle that give (radius, height), from the rim of the bottom to that of the star."""
     result = []
 
     def foot(radius, height):
@@ -68,7 +68,7 @@ def rings():
         turn = draft + (math.pi / 2 - draft) * step / 8
         foot(edge + bend * math.cos(turn), 2.0 + bend * math.sin(turn))
 
-    # The petals rise inwards, less along their middles, and run out in the fillet of the neck.
+    # The petals rise inwards, less steeply along their middles, and end in the fillet of the neck.
     def petal(radius, height, share):
         def ring(angle):
             slope = math.tan(math.radians(5.0 - 4.5 * crest(angle)))
@@ -82,7 +82,7 @@ def rings():
         turn = math.pi / 2 * step / 14
         petal(7.4 - 2.0 * math.sin(turn), 2.5 + 2.0 * (1 - math.cos(turn)), math.cos(turn) ** 2)
 
-    # The head: an ellipsoid that fades into the tilted face.
+    # The head: an ellipsoid that blends into the tilted face.
     def head(turn):
         radius, height = 8.2 * math.cos(turn), 9.4 + 6.2 * math.sin(turn)
         result.append(lambda angle: (radius, smooth_minimum(
@@ -92,7 +92,7 @@ def rings():
     for step in range(61):
         head(lowest + (highest - lowest) * step / 60)
 
-    # The star's wall stands upright on the face.
+    # The wall of the star is vertical.
     def outline(height):
         def ring(angle):
             radius = star(angle)
@@ -105,7 +105,7 @@ def rings():
 
 
 def make_mesh():
-    """Vertices in mm, rounded to a hundredth of a micrometre, and triangles that face outwards."""
+    """Returns vertices in mm, rounded to a hundredth of a micrometre, and triangles that face outwards."""
     profile = rings()
     vertices = [(0.0, 0.0, 0.0)]
     for ring in profile:

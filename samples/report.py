@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Lays the figures of several runs side by side, on one HTML page that needs no other file.
+"""Writes the figures of several runs side by side on one HTML page that needs no other file.
 
     samples/report.py PAGE.html FILE_OR_FOLDER ...
 
-Takes reports of `measure --report` (a table, the cumulative errors, the roughness of the facets), figures of `ssim --json`
-(a table) and pictures (.png, as `render` makes them), one by one or all that lie in a folder. A run is called by its file's
-name, with the folder's before it where there are several.
+The arguments are reports of `measure --report` (shown as a table, cumulative errors and the roughness of facets), figures of
+`ssim --json` (shown as a table), pictures (.png, as `render` makes them), or folders that contain such files. The name of a run
+is the name of its file, preceded by the name of the folder if there are several folders.
 """
 
 import base64
@@ -21,7 +21,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 ERRORS = {"bias_mm": "bias", "mean_mm": "mean", "rms_mm": "RMS", "p50_mm": "50 %", "p95_mm": "95 %", "p99_mm": "99 %",
-          "max_mm": "greatest"}
+          "max_mm": "maximum"}
 LIKENESS = {"ssim": "SSIM", "ssim_seen": "SSIM of what the eye sees", "flip": "FLIP"}
 STYLE = """body{font:15px/1.4 sans-serif;margin:2em auto;max-width:76em;padding:0 1em;color:#222}
 table{border-collapse:collapse}td,th{padding:.2em .8em;border-bottom:1px solid #ccc;text-align:right}
@@ -31,7 +31,7 @@ figcaption{font-size:85%}"""
 
 
 def files_of(arguments):
-    """The files to lay out, and what each is called."""
+    """Returns the files to show, each with its name."""
     found = []
     for argument in map(pathlib.Path, arguments):
         if argument.is_dir():
@@ -45,7 +45,7 @@ def files_of(arguments):
 
 
 def sorted_by_kind(files):
-    """Reports of measure, figures of ssim, pictures: name to what it is."""
+    """Returns three dictionaries by name: reports of measure, figures of ssim, pictures."""
     measured, alike, pictures = {}, {}, {}
     for path, name in files:
         if path.suffix == ".png":
@@ -54,20 +54,20 @@ def sorted_by_kind(files):
         try:
             content = json.loads(path.read_text())
         except ValueError as problem:
-            raise SystemExit(f"report: '{path}' is no JSON: {problem}")
+            raise SystemExit(f"report: '{path}' is not valid JSON: {problem}")
         if isinstance(content, dict) and "cumulative_mm" in content.get("area", {}):
             measured[name] = content
         elif isinstance(content, dict) and all(key in content for key in LIKENESS):
             alike[name] = content
         else:
-            print(f"report: '{path}' is left out: neither of measure --report nor of ssim --json", file=sys.stderr)
+            print(f"report: '{path}' is skipped: not from measure --report or ssim --json", file=sys.stderr)
     if not (measured or alike or pictures):
-        raise SystemExit("report: there is nothing to lay out; give reports of measure, figures of ssim or pictures")
+        raise SystemExit("report: nothing to show; give reports of measure, figures of ssim or pictures")
     return measured, alike, pictures
 
 
 def table(heads, rows, best=None):
-    """`rows`: name to numbers; the best of each column is marked, by `best` as each column says."""
+    """Returns an HTML table. `rows` maps names to numbers. `best` has a key function per column; the smallest key is marked."""
     lines = ["<table><tr><th>run</th>" + "".join(f"<th>{html.escape(head)}</th>" for head in heads) + "</tr>"]
     for name, row in rows.items():
         cells = ""
@@ -110,10 +110,10 @@ def of_measure(measured):
             places = [place + 0.8 * n / len(measured) for place in range(len(facets))]
             axis.bar(places, [1000 * facet["sq_mm"] for facet in facets], 0.8 / len(measured), alpha=0.4, color=f"C{n}")
             axis.bar(places, [1000 * facet["sq_band_mm"] for facet in facets], 0.8 / len(measured), color=f"C{n}", label=name)
-        axis.set(xlabel="facet", ylabel="Sq, µm; dark: beyond the cut-off")
+        axis.set(xlabel="facet", ylabel="Sq, µm; dark: wavelengths beyond the cut-off")
         axis.legend(fontsize=8)
 
-    parts = ["<h2>Distance to the mesh that it should be</h2><p>By area, in µm; the volume in %.</p>",
+    parts = ["<h2>Distance to the reference mesh</h2><p>By area, in µm; volume error in %.</p>",
              table([*ERRORS.values(), "volume"], rows, [abs] * (len(ERRORS) + 1)), '<div class="pictures">',
              plot("cumulative error", 6, cumulative)]
     if any(report["facets"] for report in measured.values()):
@@ -125,12 +125,12 @@ def main():
     if len(sys.argv) < 3 or not sys.argv[1].endswith(".html"):
         raise SystemExit("usage: samples/report.py PAGE.html FILE_OR_FOLDER ...")
     measured, alike, pictures = sorted_by_kind(files_of(sys.argv[2:]))
-    parts = [f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>Prints, side by side</title><style>{STYLE}'
-             "</style></head><body><h1>Prints, side by side</h1>"]
+    parts = [f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>Comparison of prints</title><style>{STYLE}'
+             "</style></head><body><h1>Comparison of prints</h1>"]
     if measured:
         parts += of_measure(measured)
     if alike:
-        parts += ["<h2>How alike it looks</h2>",
+        parts += ["<h2>Similarity of pictures</h2>",
                   table(LIKENESS.values(), {name: [figures[key] for key in LIKENESS] for name, figures in alike.items()},
                         [lambda value: -value, lambda value: -value, abs])]
     if pictures:

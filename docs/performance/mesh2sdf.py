@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""Measures how the distance field's cost grows, and draws it with fitted exponents.
+"""Measures the growth of the cost of the distance field, and draws it with fitted exponents.
 
 mesh2sdf.py measure PROGRAM part.obj mesh2sdf.json     (PROGRAM is build/release/tests/mesh_distance_bench)
 mesh2sdf.py draw mesh2sdf.json mesh2sdf.png
 
-Against resolution: the part at 50, 100 and 200 mm on one lattice, which is a pitch of ×1, ×½ and ×¼.
-Against triangles: a bumpy ball of 60 mm in ever more triangles. CPU time on one thread in slabs of 64
-layers, the least of three runs.
+Against resolution: the part at 50, 100 and 200 mm on one lattice, which equals a pitch of ×1, ×½ and ×¼.
+Against triangles: a bumpy ball of 60 mm with increasing numbers of triangles. The cost is the CPU time on one
+thread in slabs of 64 layers, the minimum of three runs.
 """
 
 import json
@@ -22,7 +22,7 @@ import matplotlib.pyplot as plt
 
 
 def cpu_seconds(program, size_mm, mesh):
-    """Least CPU time of the default band in slabs, and the active voxels."""
+    """Returns the minimum CPU time of the default band in slabs, and the active voxels."""
     output = subprocess.run([program, "--benchmark_format=json", "--benchmark_repetitions=3",
                              "--benchmark_filter=default/slabs/process_time", str(size_mm), mesh],
                             check=True, capture_output=True, text=True).stdout
@@ -31,7 +31,7 @@ def cpu_seconds(program, size_mm, mesh):
 
 
 def write_ball(path, rings):
-    """A ball with bumps as a binary PLY; returns the number of its triangles."""
+    """Writes a ball with bumps as a binary PLY. Returns the number of its triangles."""
     around = 2 * rings
     polar = numpy.linspace(0, numpy.pi, rings + 1)[1:-1, None]
     turn = numpy.linspace(0, 2 * numpy.pi, around, endpoint=False)[None, :]
@@ -70,7 +70,7 @@ def measure(program, part):
 
 
 def exponent(points):
-    """Of the power law that fits the points best."""
+    """Returns the exponent of the power law that fits the points best."""
     x, y = numpy.log(numpy.array(points, dtype=float)).T
     return numpy.polyfit(x, y, 1)[0]
 

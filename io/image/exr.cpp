@@ -151,7 +151,7 @@ std::vector<std::uint8_t> encodeExr(std::uint32_t width, std::uint32_t height,
   return bytes;
 }
 
-RunImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel) {
+SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel) {
   try {
     MemorySource source(bytes);
     Imf::InputFile file(source, 0);
@@ -159,7 +159,7 @@ RunImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& chann
     if (!file.header().channels().findChannel(channel))
       throw DataError("has no channel '" + channel + "'");
     const int width = window.max.x - window.min.x + 1;
-    RunsBuilder runs(static_cast<std::uint32_t>(width));
+    SpansBuilder spans(static_cast<std::uint32_t>(width));
     std::vector<float> row(static_cast<std::size_t>(width));
     for (int y = window.min.y; y <= window.max.y; ++y) {
       Imf::FrameBuffer buffer;
@@ -175,11 +175,11 @@ RunImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& chann
                           " of row " + std::to_string(y - window.min.y) +
                           ", which is no index of a material");
         }
-        runs.pixel(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(row[x]));
+        spans.pixel(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(row[x]));
       }
-      runs.endRow();
+      spans.endRow();
     }
-    return runs.finish();
+    return spans.finish();
   } catch (const DataError&) {
     throw;
   } catch (const std::exception& error) {

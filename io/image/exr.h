@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "vdbdither/model/run_image.h"
+#include "vdbdither/model/span_image.h"
 
 namespace vdbdither {
 
@@ -32,8 +32,8 @@ std::vector<std::uint8_t> encodeExr(std::uint32_t width, std::uint32_t height,
                                     const ExrFormat& format, std::span<const ExrChannel> channels,
                                     const ExrRow& fill);
 
-/// A channel of whole numbers from 0, as runs of them. Throws DataError in words that go on from
+/// A channel of whole numbers from 0, as spans of them. Throws DataError in words that go on from
 /// the file's name.
-RunImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel);
+SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel);
 
 }  // namespace vdbdither

@@ -20,17 +20,17 @@ Picture readPicture(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), {});
   if (!stream) throw DataError("cannot read '" + path.string() + "'");
-  RunImage runs;
+  SpanImage spans;
   try {
-    runs = decodePng({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+    spans = decodePng({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
   } catch (const DataError& problem) {
     throw DataError("'" + path.string() + "' " + problem.what());
   }
-  Picture picture{runs.width, runs.height, {}};
-  picture.pixels.reserve(std::size_t{runs.width} * runs.height);
-  for (std::uint32_t y = 0; y < runs.height; ++y) {
-    for (const Run& run : runs.row(y))
-      picture.pixels.resize(std::size_t{y} * runs.width + run.end, run.value);
+  Picture picture{spans.width, spans.height, {}};
+  picture.pixels.reserve(std::size_t{spans.width} * spans.height);
+  for (std::uint32_t y = 0; y < spans.height; ++y) {
+    for (const Span& span : spans.row(y))
+      picture.pixels.resize(std::size_t{y} * spans.width + span.end, span.value);
   }
   return picture;
 }

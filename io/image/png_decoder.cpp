@@ -28,7 +28,7 @@ class Decoder {
   Decoder& operator=(const Decoder&) = delete;
   ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
 
-  RunImage run() {
+  SpanImage run() {
     png_read_info(png_, info_);
     if (png_get_interlace_type(png_, info_) != PNG_INTERLACE_NONE)
       throw DataError("is interlaced; save it without");
@@ -39,19 +39,19 @@ class Decoder {
     png_read_update_info(png_, info_);
     const std::uint32_t width = png_get_image_width(png_, info_);
     const std::uint32_t height = png_get_image_height(png_, info_);
-    RunsBuilder runs(width);
+    SpansBuilder spans(width);
     std::vector<std::uint8_t> row(png_get_rowbytes(png_, info_));
     for (std::uint32_t y = 0; y < height; ++y) {
       png_read_row(png_, row.data(), nullptr);
       for (std::uint32_t x = 0; x < width; ++x) {
         std::uint32_t colour = 0;
         std::memcpy(&colour, row.data() + std::size_t{4} * x, sizeof colour);
-        runs.pixel(x, colour);
+        spans.pixel(x, colour);
       }
-      runs.endRow();
+      spans.endRow();
     }
     png_read_end(png_, nullptr);
-    return runs.finish();
+    return spans.finish();
   }
 
  private:
@@ -73,6 +73,6 @@ class Decoder {
 
 }  // namespace
 
-RunImage decodePng(std::span<const std::uint8_t> bytes) { return Decoder(bytes).run(); }
+SpanImage decodePng(std::span<const std::uint8_t> bytes) { return Decoder(bytes).run(); }
 
 }  // namespace vdbdither

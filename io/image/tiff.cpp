@@ -73,19 +73,19 @@ TiffHandle open(Memory& memory, const char* mode) {
           TIFFClose};
 }
 
-/// A row of runs as the bytes of the file.
-void packRow(std::span<const Run> runs, bool bits, std::vector<std::uint8_t>& row) {
+/// A row of spans as the bytes of the file.
+void packRow(std::span<const Span> spans, bool bits, std::vector<std::uint8_t>& row) {
   std::fill(row.begin(), row.end(), 0);
   std::uint32_t begin = 0;
-  for (const Run& run : runs) {
-    for (std::uint32_t x = begin; x < run.end; ++x) {
+  for (const Span& span : spans) {
+    for (std::uint32_t x = begin; x < span.end; ++x) {
       if (!bits) {
-        row[x] = static_cast<std::uint8_t>(run.value);
-      } else if (run.value) {
+        row[x] = static_cast<std::uint8_t>(span.value);
+      } else if (span.value) {
         row[x / 8] |= static_cast<std::uint8_t>(128 >> x % 8);
       }
     }
-    begin = run.end;
+    begin = span.end;
   }
 }
 
@@ -100,7 +100,7 @@ void setPalette(TIFF* tiff, std::span<const std::uint32_t> palette) {
 
 }  // namespace
 
-std::vector<std::uint8_t> encodeTiff(const RunImage& image, const TiffFormat& format) {
+std::vector<std::uint8_t> encodeTiff(const SpanImage& image, const TiffFormat& format) {
   if (image.width == 0 || image.height == 0) throw DataError("an image without pixels is no TIFF");
   if (format.palette.size() > 256) throw DataError("a TIFF has at most 256 colours");
   const bool bits = format.palette.empty();
@@ -133,7 +133,7 @@ std::vector<std::uint8_t> encodeTiff(const RunImage& image, const TiffFormat& fo
   return std::move(memory.bytes);
 }
 
-RunImage decodeTiff(std::span<const std::uint8_t> bytes) {
+SpanImage decodeTiff(std::span<const std::uint8_t> bytes) {
   Memory memory{{bytes.begin(), bytes.end()}, 0, ""};
   const TiffHandle tiff = open(memory, "r");
   const auto refuse = [&] { return DataError("is no readable TIFF: " + memory.error); };
@@ -151,16 +151,16 @@ RunImage decodeTiff(std::span<const std::uint8_t> bytes) {
   if ((depth != 1 && depth != 8) || samples != 1 || TIFFIsTiled(tiff.get()))
     throw DataError("is a TIFF of another kind: one sample of 1 or 8 bits is wanted, in strips");
   const std::uint32_t flip = depth == 1 && meaning == PHOTOMETRIC_MINISWHITE ? 1 : 0;
-  RunsBuilder runs(width);
+  SpansBuilder spans(width);
   std::vector<std::uint8_t> row(static_cast<std::size_t>(TIFFScanlineSize(tiff.get())));
   for (std::uint32_t y = 0; y < height; ++y) {
     if (TIFFReadScanline(tiff.get(), row.data(), y) != 1) throw refuse();
     for (std::uint32_t x = 0; x < width; ++x)
-      runs.pixel(x, depth == 8 ? row[x] : (row[x / 8] >> (7 - x % 8) & 1U) ^ flip);
-    runs.endRow();
+      spans.pixel(x, depth == 8 ? row[x] : (row[x / 8] >> (7 - x % 8) & 1U) ^ flip);
+    spans.endRow();
   }
   if (!memory.error.empty()) throw refuse();
-  return runs.finish();
+  return spans.finish();
 }
 
 }  // namespace vdbdither

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "vdbdither/model/run_image.h"
+#include "vdbdither/model/span_image.h"
 
 namespace vdbdither {
 
@@ -20,10 +20,10 @@ struct TiffFormat {
 /// The bytes of a TIFF file: one bit a pixel packed by CCITT group 4, or a palette of eight bits
 /// packed by LZW. Same image, same bytes. Throws DataError for an image without pixels, and for
 /// more than 256 colours.
-std::vector<std::uint8_t> encodeTiff(const RunImage& image, const TiffFormat& format);
+std::vector<std::uint8_t> encodeTiff(const SpanImage& image, const TiffFormat& format);
 
 /// The pixels of a TIFF of one bit or of eight with one sample: bits, or what indexes the palette.
 /// Read row by row. Throws DataError in words that go on from the file's name.
-RunImage decodeTiff(std::span<const std::uint8_t> bytes);
+SpanImage decodeTiff(std::span<const std::uint8_t> bytes);
 
 }  // namespace vdbdither

@@ -49,7 +49,7 @@ class ExrSlices : public SliceEncoder {
     const auto fill = [&](std::uint32_t row, std::size_t channel, std::span<float> values) {
       const std::string& name = channels_[channel].name;
       if (name == "material") {
-        fillFromRuns(layer.image.row(row), values);
+        fillFromSpans(layer.image.row(row), values);
       } else if (name == "distance") {
         fillFromGrid(*findGrid<openvdb::FloatGrid>(layer.grids, surface_grid), layer.z, row, values,
                      [](float value) { return value; });
@@ -60,17 +60,17 @@ class ExrSlices : public SliceEncoder {
       }
     };
     const ExrFormat format{pitchMm().x() / pitchMm().y(), packing_, tile_};
-    const SliceFrame& frame = stack().frame;
+    const SliceLayout& layout = stack().layout;
     return {{layer.name + ".exr", "",
-             encodeExr(frame.width(), frame.height(), format, channels_, fill)}};
+             encodeExr(layout.width(), layout.height(), format, channels_, fill)}};
   }
 
  private:
-  static void fillFromRuns(std::span<const Run> runs, std::span<float> values) {
+  static void fillFromSpans(std::span<const Span> spans, std::span<float> values) {
     std::uint32_t begin = 0;
-    for (const Run& run : runs) {
-      std::fill(values.begin() + begin, values.begin() + run.end, static_cast<float>(run.value));
-      begin = run.end;
+    for (const Span& span : spans) {
+      std::fill(values.begin() + begin, values.begin() + span.end, static_cast<float>(span.value));
+      begin = span.end;
     }
   }
 
@@ -78,16 +78,16 @@ class ExrSlices : public SliceEncoder {
   template <class Grid, class Convert>
   void fillFromGrid(const Grid& grid, int z, std::uint32_t row, std::span<float> values,
                     const Convert& convert) const {
-    const SliceFrame& frame = stack().frame;
-    const openvdb::CoordBBox& box = frame.box;
+    const SliceLayout& layout = stack().layout;
+    const openvdb::CoordBBox& box = layout.box;
     std::fill(values.begin(), values.end(), convert(grid.background()));
-    const int from_top = static_cast<int>(row) - frame.padding;
+    const int from_top = static_cast<int>(row) - layout.padding;
     if (from_top < 0 || from_top >= box.dim().y()) return;
     const auto accessor = grid.getConstAccessor();
-    openvdb::Coord at(0, frame.flip_y ? box.min().y() + from_top : box.max().y() - from_top, z);
+    openvdb::Coord at(0, layout.flip_y ? box.min().y() + from_top : box.max().y() - from_top, z);
     for (int i = 0; i < box.dim().x(); ++i) {
-      at.x() = frame.flip_x ? box.max().x() - i : box.min().x() + i;
-      values[frame.padding + i] = convert(accessor.getValue(at));
+      at.x() = layout.flip_x ? box.max().x() - i : box.min().x() + i;
+      values[layout.padding + i] = convert(accessor.getValue(at));
     }
   }
 
@@ -97,7 +97,7 @@ class ExrSlices : public SliceEncoder {
   std::vector<ExrChannel> channels_;
 };
 
-RunImage decodeMaterials(std::span<const std::uint8_t> bytes) {
+SpanImage decodeMaterials(std::span<const std::uint8_t> bytes) {
   return decodeExr(bytes, "material");
 }
 

@@ -31,7 +31,8 @@ Manifest manifestOf(const ordered_json& json) {
                           tripleOf<openvdb::Coord>(json.at("box").at("max"))};
   manifest.format = json.at("format");
   manifest.grid = json.value("grid", material_grid);
-  manifest.frame = {manifest.lattice.box, json.at("padding"), json.at("flip_x"), json.at("flip_y")};
+  manifest.layout = {manifest.lattice.box, json.at("padding"), json.at("flip_x"),
+                     json.at("flip_y")};
   manifest.layers.begin = json.at("first_layer");
   manifest.layers.end = manifest.layers.begin + json.at("size").at(2).get<int>();
   if (json.contains("cropped")) {
@@ -54,7 +55,7 @@ Manifest manifestOf(const ordered_json& json) {
 }  // namespace
 
 std::string textOf(const Manifest& manifest) {
-  const SliceFrame& frame = manifest.frame;
+  const SliceLayout& layout = manifest.layout;
   const Lattice& lattice = manifest.lattice;
   ordered_json json;
   json["creator"] = std::string("vdbdither ") + version;
@@ -64,13 +65,13 @@ std::string textOf(const Manifest& manifest) {
   json["grid"] = manifest.grid;
   json["pitch_mm"] = jsonOf(lattice.pitch_mm);
   json["origin_mm"] = jsonOf(lattice.origin_mm);
-  json["size"] = {frame.width(), frame.height(), manifest.layers.size()};
+  json["size"] = {layout.width(), layout.height(), manifest.layers.size()};
   json["first_layer"] = manifest.layers.begin;
   json["cropped"] = {{"below", manifest.cropped_below}, {"above", manifest.cropped_above}};
   json["box"] = {{"min", jsonOf(lattice.box.min())}, {"max", jsonOf(lattice.box.max())}};
-  json["padding"] = frame.padding;
-  json["flip_x"] = frame.flip_x;
-  json["flip_y"] = frame.flip_y;
+  json["padding"] = layout.padding;
+  json["flip_x"] = layout.flip_x;
+  json["flip_y"] = layout.flip_y;
   json["background"] = manifest.background;
   json["materials"] = ordered_json::array();
   for (std::size_t i = 0; i < manifest.materials.size(); ++i) {
@@ -106,7 +107,7 @@ Manifest readManifest(const StackInput& stack) {
     if (!(lattice.pitch_mm[axis] > 0))
       throw DataError(shown + ": pitch_mm is not above zero" + make_stack_again);
   }
-  if (lattice.box.empty() || manifest.frame.padding < 0 || manifest.layers.empty() ||
+  if (lattice.box.empty() || manifest.layout.padding < 0 || manifest.layers.empty() ||
       manifest.cropped_below < 0 || manifest.cropped_above < 0 ||
       intersection(manifest.knownLayers(), lattice.layers()) != manifest.knownLayers()) {
     throw DataError(shown + ": box, padding and layers do not fit together" + make_stack_again);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "io/profile/material_table.h"
-#include "io/stack/slice_runs.h"
+#include "io/stack/slice_spans.h"
 #include "io/stack/stack_files.h"
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/lattice.h"
@@ -28,7 +28,7 @@ struct Manifest {
   std::string printer;               ///< the profile as JSON, or empty
   std::vector<std::string> history;  ///< one command line per step
   Lattice lattice;                   ///< of the job
-  SliceFrame frame;                  ///< of every slice; its box is the lattice's
+  SliceLayout layout;                ///< of every slice; its box is the lattice's
   std::array<std::uint8_t, 4> background{};
   MaterialTable materials;
   std::vector<std::uint64_t> voxels;  ///< of each material; not read back
@@ -50,7 +50,7 @@ inline constexpr const char* make_stack_again = "; make the stack again with sli
 std::string textOf(const Manifest& manifest);
 
 /// Reads the manifest of a stack. Throws DataError where it is missing or malformed, and where its
-/// lattice, frame and layers do not fit together.
+/// lattice, layout and layers do not fit together.
 Manifest readManifest(const StackInput& stack);
 
 }  // namespace vdbdither

@@ -1,5 +1,5 @@
 #include "io/image/png_decoder.h"
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 #include "io/stack/slice_format.h"
 
 namespace vdbdither {

@@ -1,13 +1,13 @@
 #include "io/stack/slice_format.h"
 
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 #include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
 void SliceEncoder::plan(const Manifest& stack, const Grids& /*grids*/) { stack_ = stack; }
 
-void SliceEncoder::finish(const Manifest& stack, const RunImage& preview,
+void SliceEncoder::finish(const Manifest& stack, const SpanImage& preview,
                           StackOutput& output) const {
   output.write("preview.png", encodePng(preview, {}));
   const std::string text = textOf(stack);

@@ -13,8 +13,8 @@
 #include "io/stack/manifest.h"
 #include "io/stack/stack_files.h"
 #include "vdbdither/engine/options.h"
-#include "vdbdither/model/run_image.h"
 #include "vdbdither/model/slab.h"
+#include "vdbdither/model/span_image.h"
 
 namespace vdbdither {
 
@@ -30,9 +30,9 @@ enum class SlicePixel {
 /// A layer on its way into files.
 struct SliceLayer {
   int z = 0;
-  std::string name;       ///< of its files, without a folder and an ending
-  const RunImage& image;  ///< the index of the material of each voxel; 0 is empty
-  const Grids& grids;     ///< the slab's, which hold this layer
+  std::string name;        ///< of its files, without a folder and an ending
+  const SpanImage& image;  ///< the index of the material of each voxel; 0 is empty
+  const Grids& grids;      ///< the slab's, which hold this layer
 };
 
 /// A file of a stack.
@@ -66,7 +66,7 @@ class SliceEncoder {
   /// Writes what describes the whole stack: its preview and its manifest. Throws DataError.
   /// @param stack    complete
   /// @param preview  a picture of the part and its fullest slice, as colours
-  virtual void finish(const Manifest& stack, const RunImage& preview, StackOutput& output) const;
+  virtual void finish(const Manifest& stack, const SpanImage& preview, StackOutput& output) const;
 
  protected:
   /// As it was planned.
@@ -96,7 +96,7 @@ struct SliceFormat {
   std::unique_ptr<SliceEncoder> (*encoder)();
   /// Returns the pixels of a file: colours as rgba() makes them, or numbers. Throws DataError in
   /// words that go on from the file's name.
-  RunImage (*decode)(std::span<const std::uint8_t> bytes);
+  SpanImage (*decode)(std::span<const std::uint8_t> bytes);
   bool decodes_colours = false;  ///< whether `decode` returns colours
 
   /// What a file takes for each leaf at the surface, about, in bytes.

@@ -9,7 +9,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 
 namespace vdbdither {
 
@@ -55,7 +55,7 @@ StackPreview::StackPreview(const openvdb::Vec3d& pitch_mm, std::uint32_t width,
   }
 }
 
-void StackPreview::add(int z, RunImage&& slice, std::uint64_t filled) {
+void StackPreview::add(int z, SpanImage&& slice, std::uint64_t filled) {
   if (filled == 0) return;
   const int rows = front_rows_ * fineness;
   const int rays = columns_ * fineness;
@@ -76,7 +76,7 @@ void StackPreview::add(int z, RunImage&& slice, std::uint64_t filled) {
   }
 }
 
-void StackPreview::look(const RunImage& slice, Hit* hits) {
+void StackPreview::look(const SpanImage& slice, Hit* hits) {
   std::iota(next_ray_.begin(), next_ray_.end(), 0U);
   const auto next_ray = [&](std::uint32_t ray) {
     while (next_ray_[ray] != ray) ray = next_ray_[ray] = next_ray_[next_ray_[ray]];
@@ -84,15 +84,15 @@ void StackPreview::look(const RunImage& slice, Hit* hits) {
   };
   for (std::uint32_t y = slice.height; y-- > 0;) {
     std::uint32_t begin = 0;
-    for (const Run& run : slice.row(y)) {
-      if (run.value) {
-        const std::uint32_t end = first_ray_[run.end];
+    for (const Span& span : slice.row(y)) {
+      if (span.value) {
+        const std::uint32_t end = first_ray_[span.end];
         for (std::uint32_t ray = next_ray(first_ray_[begin]); ray < end; ray = next_ray(ray)) {
-          hits[ray] = {static_cast<float>((slice.height - 1 - y) * pitch_mm_.y()), run.value};
+          hits[ray] = {static_cast<float>((slice.height - 1 - y) * pitch_mm_.y()), span.value};
           next_ray_[ray] = ray + 1;
         }
       }
-      begin = run.end;
+      begin = span.end;
     }
   }
 }
@@ -217,20 +217,21 @@ std::vector<StackPreview::Pixel> StackPreview::slice() const {
   for (std::uint32_t y = 0; y < height_; ++y) {
     std::fill(line.begin(), line.end(), Pixel{0, 0, 0});
     std::uint32_t begin = 0;
-    const std::array<Run, 1> blank = {Run{width_, 0}};
-    for (const Run& run : fullest_.runs.empty() ? std::span<const Run>(blank) : fullest_.row(y)) {
-      const std::uint32_t colour = palette_[run.value];
-      const Pixel pixel =
-          run.value ? Pixel{static_cast<float>(colour & 255), static_cast<float>(colour >> 8 & 255),
-                            static_cast<float>(colour >> 16 & 255)}
-                    : Pixel{background[0], background[1], background[2]};
-      spread(begin * columns_per_voxel, run.end * columns_per_voxel, columns_,
+    const std::array<Span, 1> blank = {Span{width_, 0}};
+    for (const Span& span :
+         fullest_.spans.empty() ? std::span<const Span>(blank) : fullest_.row(y)) {
+      const std::uint32_t colour = palette_[span.value];
+      const Pixel pixel = span.value ? Pixel{static_cast<float>(colour & 255),
+                                             static_cast<float>(colour >> 8 & 255),
+                                             static_cast<float>(colour >> 16 & 255)}
+                                     : Pixel{background[0], background[1], background[2]};
+      spread(begin * columns_per_voxel, span.end * columns_per_voxel, columns_,
              [&](int column, float share) {
                line[column].red += share * pixel.red;
                line[column].green += share * pixel.green;
                line[column].blue += share * pixel.blue;
              });
-      begin = run.end;
+      begin = span.end;
     }
     spread(y * rows_per_voxel, (y + 1) * rows_per_voxel, slice_rows_, [&](int row, float share) {
       Pixel* to = result.data() + static_cast<std::size_t>(row) * columns_;
@@ -244,10 +245,10 @@ std::vector<StackPreview::Pixel> StackPreview::slice() const {
   return result;
 }
 
-RunImage StackPreview::picture() const {
+SpanImage StackPreview::picture() const {
   const std::array<std::pair<std::vector<Pixel>, int>, 2> panels = {
       std::pair{front(), front_rows_}, std::pair{slice(), slice_rows_}};
-  RunImage image;
+  SpanImage image;
   image.width = static_cast<std::uint32_t>(2 * columns_ + 3 * margin);
   image.height = static_cast<std::uint32_t>(std::max(front_rows_, slice_rows_) + 2 * margin);
   image.row_begin.push_back(0);
@@ -257,7 +258,7 @@ RunImage StackPreview::picture() const {
   for (std::uint32_t y = 0; y < image.height; ++y) {
     std::uint32_t x = 0;
     const auto put = [&](const Pixel& pixel) {
-      image.runs.push_back({++x, rgba(byte(pixel.red), byte(pixel.green), byte(pixel.blue))});
+      image.spans.push_back({++x, rgba(byte(pixel.red), byte(pixel.green), byte(pixel.blue))});
     };
     const Pixel behind{background[0], background[1], background[2]};
     const auto put_margin = [&] {
@@ -273,7 +274,7 @@ RunImage StackPreview::picture() const {
       }
       put_margin();
     }
-    image.row_begin.push_back(image.runs.size());
+    image.row_begin.push_back(image.spans.size());
   }
   return image;
 }

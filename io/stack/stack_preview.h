@@ -6,7 +6,7 @@
 #include <openvdb/math/Vec3.h>
 
 #include "vdbdither/model/lattice.h"
-#include "vdbdither/model/run_image.h"
+#include "vdbdither/model/span_image.h"
 
 namespace vdbdither {
 
@@ -23,10 +23,10 @@ class StackPreview {
 
   /// Adds layer `z`, of which `filled` voxels are not empty. Layers come in rising order; missing
   /// ones are empty.
-  void add(int z, RunImage&& slice, std::uint64_t filled);
+  void add(int z, SpanImage&& slice, std::uint64_t filled);
 
   /// The picture as colours, at most 1200 x 1000 pixels.
-  [[nodiscard]] RunImage picture() const;
+  [[nodiscard]] SpanImage picture() const;
 
  private:
   /// What a ray from the front meets first.
@@ -40,7 +40,7 @@ class StackPreview {
 
   struct Surface;
 
-  void look(const RunImage& slice, Hit* hits);
+  void look(const SpanImage& slice, Hit* hits);
   /// The longest edge of a voxel, at least a pixel.
   [[nodiscard]] double stepMm() const;
   [[nodiscard]] std::vector<Surface> surfaces() const;
@@ -59,7 +59,7 @@ class StackPreview {
   std::vector<std::uint32_t> first_ray_;  ///< per column of a slice, the first ray at or after it
   std::vector<std::uint32_t>
       next_ray_;  ///< while a layer is looked at: the next ray that has met nothing
-  RunImage fullest_;
+  SpanImage fullest_;
   std::uint64_t fullest_count_ = 0;
 };
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "io/file/digest.h"
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -20,8 +20,8 @@ std::string colourText(std::uint32_t colour) {
 }
 
 /// Puts `value` where `mask` is not 0. Returns where something else is already: the row, or -1.
-int overlay(RunImage& image, const RunImage& mask, std::uint32_t value) {
-  RunsBuilder merged(image.width);
+int overlay(SpanImage& image, const SpanImage& mask, std::uint32_t value) {
+  SpansBuilder merged(image.width);
   for (std::uint32_t y = 0; y < image.height; ++y) {
     const auto below = image.row(y);
     const auto above = mask.row(y);
@@ -123,10 +123,10 @@ std::map<std::uint32_t, std::uint32_t> StackReader::meaningsOfPixels() const {
   return meanings;
 }
 
-RunImage StackReader::layer(int z) const {
-  if (!manifest_.layers.contains(z)) return blankSlice(manifest_.frame);
+SpanImage StackReader::layer(int z) const {
+  if (!manifest_.layers.contains(z)) return blankSlice(manifest_.layout);
   if (format_->pixel != SlicePixel::one_material) return read(*find(z, ""));
-  RunImage all = blankSlice(manifest_.frame);
+  SpanImage all = blankSlice(manifest_.layout);
   for (std::uint32_t i = 1; i <= manifest_.materials.size(); ++i) {
     const Manifest::Slice& slice = *find(z, manifest_.materials[i - 1].name);
     const int row = overlay(all, read(slice), i);
@@ -139,19 +139,19 @@ RunImage StackReader::layer(int z) const {
   return all;
 }
 
-RunImage StackReader::read(const Manifest::Slice& slice) const {
+SpanImage StackReader::read(const Manifest::Slice& slice) const {
   const std::vector<std::uint8_t> bytes = input_.read(slice.file);
   if (sha256Of(bytes) != slice.sha256 && !warned_.exchange(true)) {
     warn_("'" + input_.shown(slice.file) +
           "' is not as its manifest describes it; it is taken as it is, and so are others like it");
   }
   try {
-    RunImage image = format_->decode(bytes);
-    const SliceFrame& frame = manifest_.frame;
-    if (image.width != frame.width() || image.height != frame.height()) {
+    SpanImage image = format_->decode(bytes);
+    const SliceLayout& layout = manifest_.layout;
+    if (image.width != layout.width() || image.height != layout.height()) {
       throw DataError("has " + std::to_string(image.width) + " x " + std::to_string(image.height) +
-                      " pixels, not " + std::to_string(frame.width()) + " x " +
-                      std::to_string(frame.height()) + " as the stack" + make_stack_again);
+                      " pixels, not " + std::to_string(layout.width()) + " x " +
+                      std::to_string(layout.height()) + " as the stack" + make_stack_again);
     }
     translate(image);
     return image;
@@ -162,23 +162,23 @@ RunImage StackReader::read(const Manifest::Slice& slice) const {
 }
 
 /// From pixels to indices of materials.
-void StackReader::translate(RunImage& image) const {
+void StackReader::translate(SpanImage& image) const {
   for (std::uint32_t y = 0; y < image.height; ++y) {
     std::uint32_t begin = 0;
     for (std::size_t i = image.row_begin[y]; i < image.row_begin[y + 1]; ++i) {
-      Run& run = image.runs[i];
-      const auto meaning = meanings_.find(run.value);
+      Span& span = image.spans[i];
+      const auto meaning = meanings_.find(span.value);
       if (meaning == meanings_.end()) {
         const bool colours = format_->decodes_colours;
         throw DataError(
             "has the " +
-            (colours ? "colour " + colourText(run.value) : "value " + std::to_string(run.value)) +
+            (colours ? "colour " + colourText(span.value) : "value " + std::to_string(span.value)) +
             " in column " + std::to_string(begin) + " of row " + std::to_string(y) +
             ", which no material of the manifest has; give it one of theirs" +
             (colours ? ", and mind that smoothing makes new colours" : ""));
       }
-      run.value = meaning->second;
-      begin = run.end;
+      span.value = meaning->second;
+      begin = span.end;
     }
   }
 }

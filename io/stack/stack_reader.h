@@ -27,7 +27,7 @@ class StackReader {
   /// Returns the index of the material of every voxel of layer `z`, one of the known layers; of a
   /// format that does not tell materials apart 1 for each. Safe to call from many threads. Throws
   /// DataError.
-  [[nodiscard]] RunImage layer(int z) const;
+  [[nodiscard]] SpanImage layer(int z) const;
 
  private:
   void checkFiles() const;
@@ -35,8 +35,8 @@ class StackReader {
   [[nodiscard]] const Manifest::Slice* find(int z, const std::string& material) const;
   /// The names of the materials with files of their own, or one empty name.
   [[nodiscard]] std::vector<std::string> filesOfLayer() const;
-  [[nodiscard]] RunImage read(const Manifest::Slice& slice) const;
-  void translate(RunImage& image) const;
+  [[nodiscard]] SpanImage read(const Manifest::Slice& slice) const;
+  void translate(SpanImage& image) const;
   [[nodiscard]] int numberOf(int z) const { return z - manifest_.lattice.box.min().z(); }
 
   StackInput input_;

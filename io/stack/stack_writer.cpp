@@ -7,7 +7,7 @@
 #include <tbb/task_arena.h>
 
 #include "io/file/digest.h"
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -25,7 +25,7 @@ std::vector<std::uint32_t> displayColours(const MaterialTable& materials) {
 /// A layer on its way through the threads.
 struct StackWriter::Layer {
   int z = 0;
-  RunImage image;
+  SpanImage image;
   std::vector<SliceFile> files;
   std::vector<std::string> sha256;    ///< of each of the files
   std::vector<std::uint64_t> voxels;  ///< of each material
@@ -39,12 +39,12 @@ StackWriter::StackWriter(const std::filesystem::path& target, Manifest stack, Sl
       keep_blank_(keep_blank || !encoder.reads().empty()),
       lowest_(stack_.lattice.layers().begin),
       output_(target),
-      preview_(stack_.lattice.pitch_mm, stack_.frame.width(), stack_.frame.height(),
+      preview_(stack_.lattice.pitch_mm, stack_.layout.width(), stack_.layout.height(),
                stack_.lattice.layers(), displayColours(stack_.materials)) {
   stack_.voxels.assign(stack_.materials.size(), 0);
 }
 
-void StackWriter::add(ZRange layers, std::vector<RunImage> images, const Grids& grids) {
+void StackWriter::add(ZRange layers, std::vector<SpanImage> images, const Grids& grids) {
   if (known_.empty()) known_ = {layers.begin, layers.begin};
   if (layers.begin != known_.end) {
     throw DataError("layers " + std::to_string(known_.end) + " to " +
@@ -53,7 +53,7 @@ void StackWriter::add(ZRange layers, std::vector<RunImage> images, const Grids& 
   known_.end = layers.end;
   std::vector<Layer> ready;
   for (int z = layers.begin; z < layers.end; ++z) {
-    RunImage& image = images[static_cast<std::size_t>(z - layers.begin)];
+    SpanImage& image = images[static_cast<std::size_t>(z - layers.begin)];
     if (!keep_blank_ && isBlank(image)) {
       ++waiting_;
       continue;
@@ -70,7 +70,7 @@ void StackWriter::add(ZRange layers, std::vector<RunImage> images, const Grids& 
 
 void StackWriter::release(int end, std::vector<Layer>& layers) {
   for (int z = end - std::exchange(waiting_, 0); z < end; ++z)
-    layers.push_back({z, blankSlice(stack_.frame), {}, {}, {}});
+    layers.push_back({z, blankSlice(stack_.layout), {}, {}, {}});
 }
 
 // The layers are kept here, for TBB forgets what is on its way when one of the steps fails.
@@ -126,14 +126,14 @@ std::vector<std::uint64_t> StackWriter::countedVoxels(const Layer& layer) const 
   std::vector<std::uint64_t> voxels(stack_.materials.size(), 0);
   for (std::uint32_t y = 0; y < layer.image.height; ++y) {
     std::uint32_t begin = 0;
-    for (const Run& run : layer.image.row(y)) {
-      if (run.value > voxels.size()) {
+    for (const Span& span : layer.image.row(y)) {
+      if (span.value > voxels.size()) {
         throw DataError("layer " + std::to_string(layer.z) + " holds material " +
-                        std::to_string(static_cast<std::int32_t>(run.value)) +
+                        std::to_string(static_cast<std::int32_t>(span.value)) +
                         ", but the table of materials ends at " + std::to_string(voxels.size()));
       }
-      if (run.value > 0) voxels[run.value - 1] += run.end - begin;
-      begin = run.end;
+      if (span.value > 0) voxels[span.value - 1] += span.end - begin;
+      begin = span.end;
     }
   }
   return voxels;

@@ -34,7 +34,7 @@ class StackWriter {
   /// @param grids   the slab's
   /// Throws DataError where a layer is missing, where a voxel's material is not in the table, and
   /// where the disk is full.
-  void add(ZRange layers, std::vector<RunImage> images, const Grids& grids);
+  void add(ZRange layers, std::vector<SpanImage> images, const Grids& grids);
 
   /// Completes the stack and gives it its name. Returns what its manifest says.
   const Manifest& finish();

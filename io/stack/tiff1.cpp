@@ -6,8 +6,8 @@ namespace vdbdither {
 namespace {
 
 /// 1 where `image` has this value, else 0.
-RunImage masked(RunImage image, std::uint32_t value) {
-  for (Run& run : image.runs) run.value = run.value == value ? 1 : 0;
+SpanImage masked(SpanImage image, std::uint32_t value) {
+  for (Span& span : image.spans) span.value = span.value == value ? 1 : 0;
   return image;
 }
 

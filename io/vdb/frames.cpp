@@ -106,7 +106,7 @@ VdbContents FrameReader::readWhole(int descriptor, const std::string& where) {
     return first;
   }
   FrameReader frames(descriptor, where, std::move(first));
-  std::map<std::string, std::vector<Layers>, std::less<>> pieces;
+  std::map<std::string, std::vector<GridLayers>, std::less<>> pieces;
   while (const std::optional<Slab> slab = frames.next())
     for (const auto& [name, grid] : slab->grids) pieces[name].push_back({grid, slab->core});
   VdbContents whole = contentsOf(frames.schema(), frames.schema().grids);

@@ -108,7 +108,7 @@ Grids SlabReader::read(ZRange core) {
   checkCovered(core);
   Grids result;
   for (const auto& [name, prototype] : schema_.grids) {
-    std::vector<Layers> pieces;
+    std::vector<GridLayers> pieces;
     for (const Slab& slab : slabs_) {
       const auto found = slab.grids.find(name);
       if (found != slab.grids.end()) pieces.push_back({found->second, slab.core});

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Shows the sample part in Blender, as four stages of a chain, without a display: out/blender.png.
+# Renders four stages of a chain with Blender, without a display: out/blender.png.
 #
 #     samples/blender/run.sh [MESH]
 set -euo pipefail
@@ -16,14 +16,14 @@ build_release default_mask
 mesh=${1:-$root/build/token.stl}
 if [ $# = 0 ]; then /usr/bin/python3 "$root/samples/make_part.py" "$mesh"; fi
 
-# Small, so that single voxels can be seen.
+# The part is small; single voxels are visible.
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "$root/build/release/vdbdither" mesh2sdf "$mesh" --printer mimaki-3duj-553 --fit 5mm ! dither ! simulate ! \
   write "$work/chain.vdb" ! mesh-export "$work/voxels.ply" --grid solid
 
 mkdir -p "$root/out"
-say "rendering (minutes: Blender works without a GPU)"
+say "rendering (takes minutes without a GPU)"
 quietly blender --background --factory-startup --python-exit-code 1 --python "$root/samples/blender/view.py" -- \
   --output "$root/out/blender.png" --surface "$work/chain.vdb:surface" --volume "$work/chain.vdb:solid" \
   --mesh "$work/voxels.ply" --surface "$work/chain.vdb:printed@0.5" \

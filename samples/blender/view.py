@@ -1,14 +1,14 @@
-"""Pictures of grids and meshes by Blender, without a display.
+"""Renders grids and meshes with Blender, without a display.
 
     blender --background --python samples/blender/view.py -- --output PICTURE.png OBJECT ...
 
-Objects stand in a row, in the order given:
+Objects are placed in a row, in the given order:
 
-    --surface FILE.vdb:GRID[@LEVEL]  a level set or a share of material, through Volume to Mesh; LEVEL is 0 unless given
-    --volume FILE.vdb:GRID           any grid of numbers or voxels, as a volume: what is not 0 scatters light
-    --mesh FILE.ply|FILE.stl         what mesh-export wrote
+    --surface FILE.vdb:GRID[@LEVEL]  a level set or a share of material, through Volume to Mesh; LEVEL defaults to 0
+    --volume FILE.vdb:GRID           any grid of numbers or voxels, as a volume; values other than 0 scatter light
+    --mesh FILE.ply|FILE.stl         a mesh, for example of mesh-export
 
-A Blender unit is a millimetre. The camera finds them by their bounding boxes.
+One Blender unit is one millimetre. The camera is placed by the bounding boxes of the objects.
 """
 
 import argparse
@@ -31,17 +31,17 @@ class Placed(argparse.Action):
 
 def arguments():
     parser = argparse.ArgumentParser(prog="view.py", description=__doc__.splitlines()[0])
-    parser.add_argument("--output", required=True, help="the PNG to make")
+    parser.add_argument("--output", required=True, help="the PNG to write")
     for kind, shape in (("surface", "FILE.vdb:GRID[@LEVEL]"), ("volume", "FILE.vdb:GRID"), ("mesh", "FILE")):
         parser.add_argument(f"--{kind}", action=Placed, dest="objects", metavar=shape)
-    parser.add_argument("--labels", default="", help="what stands before the objects, parted by commas")
+    parser.add_argument("--labels", default="", help="labels in front of the objects, separated by commas")
     parser.add_argument("--width", type=int, default=900, help="pixels")
     parser.add_argument("--height", type=int, default=270, help="pixels")
     parser.add_argument("--samples", type=int, default=64, help="rays per pixel")
-    parser.add_argument("--blend", help="keeps the scene in this .blend as well")
+    parser.add_argument("--blend", help="also save the scene in this .blend file")
     given = parser.parse_args(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
     if not given.objects:
-        parser.error("there is nothing to show: give --surface, --volume or --mesh")
+        parser.error("nothing to show: give --surface, --volume or --mesh")
     return given
 
 
@@ -61,7 +61,7 @@ def paint(colour, roughness=0.55):
 
 
 def smoke(grid, colour, size):
-    """Scatters light wherever `grid` is not 0; a sixth of `size` deep."""
+    """Returns a material that scatters light where `grid` is not 0, to a depth of a sixth of `size`."""
     material = bpy.data.materials.new("smoke")
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
@@ -85,12 +85,12 @@ def smoke(grid, colour, size):
 
 
 def load_volume(text):
-    """The volume object of `FILE:GRID`, and the grid of that name."""
+    """Returns the volume object of `FILE:GRID` and the grid of that name."""
     path, _, name = text.rpartition(":")
     volume = bpy.data.volumes.new(name)
     volume.filepath = str(pathlib.Path(path).resolve())
     if not path or not volume.grids.load():
-        raise SystemExit(f"view.py: cannot read '{path}': {volume.grids.error_message or 'no FILE.vdb:GRID'}")
+        raise SystemExit(f"view.py: cannot read '{path}': {volume.grids.error_message or 'expected FILE.vdb:GRID'}")
     for grid in volume.grids:
         if grid.name == name:
             return link(name, volume), grid
@@ -98,7 +98,7 @@ def load_volume(text):
 
 
 def half_voxel(grid):
-    """Blender takes the place that OpenVDB means as a voxel's centre for its corner."""
+    """Returns half a voxel: Blender takes the centre of a voxel in OpenVDB for its lower corner."""
     return Vector(grid.matrix_object[axis][axis] / 2 for axis in range(3))
 
 
@@ -118,7 +118,7 @@ def add_surface(text, colour):
     bpy.data.objects.remove(source)
     bpy.data.objects.remove(made)
     if not mesh.vertices:
-        raise SystemExit(f"view.py: Blender finds no surface in grid '{grid.name}'; show it with --volume")
+        raise SystemExit(f"view.py: Blender finds no surface in grid '{grid.name}'; use --volume")
     mesh.transform(Matrix.Translation(-shift))
     mesh.materials.append(paint(colour))
     return link(mesh.name, mesh)
@@ -136,7 +136,7 @@ def add_mesh(path, colour):
     before = set(bpy.data.objects)
     importer = {".stl": bpy.ops.import_mesh.stl, ".ply": bpy.ops.import_mesh.ply}.get(pathlib.Path(path).suffix.lower())
     if importer is None or not pathlib.Path(path).is_file():
-        raise SystemExit(f"view.py: '{path}' is no .stl or .ply")
+        raise SystemExit(f"view.py: '{path}' is not an .stl or .ply file")
     importer(filepath=str(pathlib.Path(path).resolve()))
     made, = set(bpy.data.objects) - before
     made.data.materials.clear()
@@ -154,7 +154,7 @@ def bounds(things):
 
 
 def in_a_row(things):
-    """One beside the other, all on the floor; returns the largest edge."""
+    """Places the objects side by side on the floor. Returns the largest edge."""
     bpy.context.view_layer.update()
     sizes = [bounds([thing]) for thing in things]
     edge = max(max(high - low) for low, high in sizes)
@@ -189,7 +189,7 @@ def add_sun(name, towards, strength, softness):
 
 
 def add_stage(things, edge):
-    """Floor, light and camera, by the bounding box of what is there."""
+    """Adds floor, light and camera according to the bounding box of the objects."""
     low, high = bounds(things)
     middle = (low + high) / 2
     floor = bpy.data.meshes.new("floor")
@@ -214,7 +214,7 @@ def add_stage(things, edge):
     bpy.context.view_layer.update()
     points = [value for thing in things for point in corners(thing) for value in point]
     camera.location, _ = camera.camera_fit_coords(bpy.context.evaluated_depsgraph_get(), points)
-    # A margin of a twentieth.
+    # Leaves a margin of a twentieth.
     camera.location += camera.matrix_world.to_quaternion() @ Vector((0, 0, 0.05 * (camera.location - middle).length))
 
 

@@ -1,13 +1,14 @@
 #!/usr/bin/python3
-"""Measures how far prints of a tilted cube lie from it, before and after the print's low-pass: the paper's figure 8, its
-table of roughness, and both readings of its equation (11).
+"""Measures the error of prints of a tilted cube, before and after the low-pass of the print: figure 8 of the paper, its table
+of roughness, and both readings of its equation (11).
 
     samples/paper/figure8.py [WORK FOLDER] [RESULT FOLDER] [METHOD]
 
-A cube of 20 mm turned by 2 degrees about each axis, printed with every method on voxels of 42 x 84 x 22 µm and, plainly, on
-cubes of 84 µm. Its surface by marching cubes is measured as it is, after 160 iterations of Taubin's smoothing, and after
-droplets have spread. What is finished in the work folder is kept; a METHOD is measured anew. The program is the first
-`vdbdither` on the PATH. Writes figure-8.json, figure-8.md, figure-8.png and figure-8-curves.png.
+The part is a cube of 20 mm turned by 2 degrees about each axis. It is printed with every method on voxels of 42 x 84 x 22 µm,
+and with plain voxelization on cubes of 84 µm. Its surface by marching cubes is measured as it is, after 160 iterations of
+Taubin's smoothing, and after droplets have spread. Finished measurements in the work folder are not repeated, except for
+METHOD. The program is the first `vdbdither` on the PATH. Writes figure-8.json, figure-8.md, figure-8.png and
+figure-8-curves.png.
 """
 
 import json
@@ -42,7 +43,7 @@ result.mkdir(parents=True, exist_ok=True)
 
 
 def interlaced_as_printed(file):
-    """Equation (11) to the letter: even slices shifted by a quarter voxel, odd ones not at all."""
+    """Writes voxels by equation (11) as printed: even slices are shifted by a quarter voxel, odd slices are not."""
     import pyopenvdb
 
     def solid(name):
@@ -66,7 +67,7 @@ def interlaced_as_printed(file):
 
 
 def crops(mesh):
-    """The middle of three faces of the cube as pictures of the error in mm, from a map that `measure` wrote."""
+    """Returns pictures of the error in mm on the middle of three faces of the cube, from a map of `measure`."""
     with open(work / mesh, "rb") as stream:
         kinds, vertices = [], 0
         for line in iter(lambda: stream.readline().decode().split(), ["end_header"]):
@@ -97,7 +98,7 @@ def crops(mesh):
 
 
 def filled(picture):
-    """A pixel without a vertex takes the nearest of its row, or else its column."""
+    """Fills pixels without a vertex from the nearest pixel of the row, or of the column."""
     for turned in (picture, picture.T):
         for row in turned:
             there = numpy.flatnonzero(~numpy.isnan(row))
@@ -107,7 +108,7 @@ def filled(picture):
 
 
 def measured(name):
-    """Reports of the three states, and the seconds it took; keeps the pictures of the faces."""
+    """Returns the reports of the three states and the elapsed seconds. Saves the pictures of the faces."""
     finished = work / f"{file_name(name)}.json"
     if finished.exists() and name != anew:
         return json.loads(finished.read_text())
@@ -137,7 +138,7 @@ def measured(name):
 
 
 def facets(report, axis):
-    """Mean of Sa, Sq and band-limited Sq over the two faces towards an axis, in µm."""
+    """Returns the mean of Sa, Sq and band-limited Sq over the two faces towards an axis, in µm."""
     faces = [face for face in report["facets"] if abs(face["normal"]["xyz".index(axis)]) > 0.9]
     return {key: 1000 * sum(face[key] for face in faces) / len(faces) for key in ("sa_mm", "sq_mm", "sq_band_mm")}
 
@@ -187,7 +188,7 @@ def lines(heads, rows):
 
 
 def page(table):
-    """The tables in Markdown."""
+    """Yields the tables in Markdown."""
     def errors(name, by):
         return [name, *(f"{1000 * table[name][state][by]['mean_mm']:.2f} / {1000 * table[name][state][by]['rms_mm']:.2f} / "
                         f"{1000 * table[name][state][by]['p95_mm']:.1f}" for state in STATES)]
@@ -204,17 +205,17 @@ def page(table):
         return [name, str(report["components"]["count"]), str(report["cavities"]["count"]),
                 f"{table[name]['before']['volume_error_percent']:+.4f}", f"{table[name]['smoothed']['volume_error_percent']:+.4f}"]
 
-    yield "Mean / RMS / 95th percentile of the error in µm, every vertex alike, as the paper plots:\n"
+    yield "Mean / RMS / 95th percentile of the error in µm, with equal weights for all vertices, as the paper plots:\n"
     yield from lines(["", *STATES.values()], (errors(name, "vertices") for name in NAMES))
     yield "\nBy area:\n"
     yield from lines(["", *STATES.values()], (errors(name, "area") for name in NAMES))
     for state in ("smoothed", "droplets"):
-        yield f"\nMean error in µm by face, {STATES[state]}; in brackets, the share of its variance that follows the steps:\n"
+        yield f"\nMean error in µm by face, {STATES[state]}. In brackets: the share of its variance that follows the steps:\n"
         yield from lines(["", "x", "y", "z"], ([name, *by_axis(name, state)] for name in NAMES))
     for state in STATES:
         yield f"\nRoughness by face, {STATES[state]}: Sa / Sq / Sq of waves longer than 0.25 mm, µm:\n"
         yield from lines(["", "x", "y", "z"], ([name, *rough(name, state)] for name in NAMES))
-    yield "\nThe printed voxels, and the volume's error in %:\n"
+    yield "\nComponents and cavities of the printed voxels, and the volume error in %:\n"
     yield from lines(["", "components", "cavities", "volume before", "volume smoothed"], (pieces(name) for name in NAMES))
 
 
@@ -236,5 +237,5 @@ kept = ("area", "vertices", "axes", "facets", "components", "cavities", "volume_
     {name: {state: {key: of[state][key] for key in kept} for state in STATES} for name, of in reports.items()})) + "\n")
 draw_maps()
 draw_curves(reports)
-text = (result / "figure-8.md").read_text() if (result / "figure-8.md").exists() else "# The paper's figure 8\n\n<!-- tables -->\n"
+text = (result / "figure-8.md").read_text() if (result / "figure-8.md").exists() else "# Figure 8 of the paper and its table of roughness\n\n<!-- tables -->\n"
 (result / "figure-8.md").write_text(text.split("<!-- tables -->")[0] + "<!-- tables -->\n\n" + "\n".join(page(reports)) + "\n")

@@ -1,13 +1,13 @@
 #!/usr/bin/python3
-"""Renders simulated prints beside the part, and tells by SSIM, SSIM of what the eye sees, and FLIP how alike they look: the
-paper's figure 9.
+"""Renders simulated prints and the part, and compares the pictures by SSIM, SSIM of what the eye sees, and FLIP: figure 9 of
+the paper.
 
     samples/paper/figure9.py [WORK FOLDER] [RESULT FOLDER] [METHOD]
 
-A cube of 10 mm turned by 2 degrees about each axis and a sphere of 8 mm; printed with every method, simulated by both models
-(the paper's smoothing of the mesh, and droplets that spread), and seen from two sides under three lights from 50 cm. What is
-finished in the work folder is kept: the script can be stopped and started again; a METHOD is measured anew. The program is the
-first `vdbdither` on the PATH. Writes figure-9.json, figure-9.md and figure-9.png.
+The parts are a cube of 10 mm turned by 2 degrees about each axis and a sphere of 8 mm. They are printed with every method,
+simulated by both models (the smoothing of the mesh from the paper, and droplets that spread), and rendered from two sides under
+three lights from 50 cm. Finished measurements in the work folder are not repeated, except for METHOD; the script can be
+interrupted and continued. The program is the first `vdbdither` on the PATH. Writes figure-9.json, figure-9.md and figure-9.png.
 """
 
 import json
@@ -35,7 +35,7 @@ work.mkdir(parents=True, exist_ok=True)
 result.mkdir(parents=True, exist_ok=True)
 
 
-# The same methods with other random numbers: how much of a figure is chance.
+# The same methods with other random numbers, to estimate the scatter.
 SECOND_SEEDS = {name: (METHODS[name][0], METHODS[name][1] + " --seed 2") for name in ("blue noise 1.1", "the default")}
 
 
@@ -54,7 +54,7 @@ def scores(reference, picture):
 
 
 def of_method(shape, process, method, name):
-    """Every score of a method, by view and light."""
+    """Returns the scores of a method, by view and light."""
     again = anew is not None and name.startswith(anew)
     name = file_name(f"{shape}-{process}-{name}")
     finished = work / f"{name}.json"
@@ -78,7 +78,7 @@ def rounded(table):
 
 
 def draw(shape, process, names):
-    """Above what is seen, below the scores."""
+    """Draws the pictures and, below them, the scores."""
     figure = plt.figure(figsize=(2.1 * (len(names) + 1), 7.6))
     grid = figure.add_gridspec(3, len(names) + 1, height_ratios=(1, 1, 1.1), hspace=0.16, wspace=0.04)
     for row, look in enumerate(("area", "staircase")):
@@ -99,7 +99,7 @@ def draw(shape, process, names):
             values = [statistics.mean(tables[shape][process][name][f"{view} {look}"][key] for view in VIEWS) for name in names]
             axis.plot(range(len(names)), values, "o-", markersize=4, linewidth=0.8, label=look, color=f"C{n}")
         axis.set_xticks(range(len(names)), [name.replace(", ", ",\n") for name in names], rotation=35, ha="right", fontsize=7)
-        axis.set_title(title + (" (less is better)" if key == "flip" else ""), fontsize=9)
+        axis.set_title(title + (" (smaller is better)" if key == "flip" else ""), fontsize=9)
         axis.tick_params(axis="y", labelsize=7)
         axis.grid(alpha=0.3)
     axis.legend(fontsize=7)
@@ -133,9 +133,9 @@ for name in METHODS:
 chance = {key: max(of["chance"][key] for of in summary["shapes"].values()) for key in FIGURES}
 rows.append("\nTwo seeds of the thresholds differ in any one picture by at most "
             + ", ".join(f"{value:.3f} ({FIGURES[key]})" for key, value in chance.items())
-            + ".\nThe part beside itself under another pattern of rays: "
+            + ".\nThe part compared with itself under another pattern of rays: "
             + "; ".join(f"{shape} " + " / ".join(f"{of['rays'][key]:.3f}" for key in FIGURES)
                         for shape, of in summary["shapes"].items()) + ".")
 page = result / "figure-9.md"
-text = page.read_text() if page.exists() else "# The paper's figure 9: how prints look\n\n<!-- tables -->\n"
+text = page.read_text() if page.exists() else "# Figure 9 of the paper: the appearance of prints\n\n<!-- tables -->\n"
 page.write_text(text.split("<!-- tables -->")[0] + "<!-- tables -->\n\n" + "\n".join(rows) + "\n")

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""Flat facets dithered by masks: what is left of their height after a Gaussian spread.
+"""Measures the height error of flat facets dithered by masks, after a Gaussian spread.
 
 mask_facets.py RESULT.json MASK.vdb...
 
-A plane, tilted against each lattice axis or with a normal anywhere on the sphere, is dithered as `dither --at foot` does it (a voxel is printed where
-d + amplitude · k_D · (M(foot voxel) - ½) < 0), its height along the axis is compared with the plane, and the difference is
-spread over the facet by a Gaussian. The figure is the root mean square of what is left, µm along the normal. Every mask meets
-the same facets: `positions` of them per axis and tilt, the azimuth and the offset drawn at random.
+A plane, tilted against each lattice axis or with a normal anywhere on the sphere, is dithered as by `dither --at foot` (a voxel is
+printed where d + amplitude · k_D · (M(foot voxel) - ½) < 0). Its height along the axis is compared with the plane, and a Gaussian
+spreads the difference over the facet. The result is the root mean square of the spread difference, µm along the normal. Every
+mask is applied to the same facets: POSITIONS of them per axis and tilt, with random azimuth and offset.
 """
 
 import json
@@ -22,7 +22,7 @@ AMPLITUDES = (2, 4)
 SPREADS_MM = (0.05, 0.1)
 POSITIONS = 8
 EDGE_MM = 5
-MARGIN_MM = 0.4  # four times the wider spread: what the Gaussian reaches over the border of the patch
+MARGIN_MM = 0.4  # four times the wider spread: the reach of the Gaussian over the border of the patch
 
 
 def tile(path):
@@ -34,7 +34,7 @@ def tile(path):
 
 
 def tilted(axis, tilt, azimuth):
-    """The unit normal `tilt` degrees off an axis."""
+    """Returns the unit normal `tilt` degrees off an axis."""
     normal = np.empty(3)
     normal[axis] = np.cos(np.radians(tilt))
     normal[(axis + 1) % 3] = np.sin(np.radians(tilt)) * np.cos(azimuth)
@@ -43,7 +43,7 @@ def tilted(axis, tilt, azimuth):
 
 
 def facet(pitch, axis, normal, phase):
-    """The plane of a patch: the axes and indices of its columns, their heights in voxels."""
+    """Returns the plane of a patch: the axes and indices of its columns, and their heights in voxels."""
     others = [a for a in range(3) if a != axis]
     u, v = np.meshgrid(*(np.arange(int(EDGE_MM / pitch[a])) for a in others), indexing="ij")
     slopes = [-normal[a] * pitch[a] / (normal[axis] * pitch[axis]) for a in others]
@@ -51,7 +51,7 @@ def facet(pitch, axis, normal, phase):
 
 
 def residual_mm(mask, pitch, axis, others, u, v, height, normal, amplitude, shift):
-    """The printed height less the plane's, along the normal."""
+    """Returns the printed height minus that of the plane, along the normal."""
     k_d = 0.5 / np.max(np.abs(normal) / pitch)
     base = np.round(height).astype(int)
     reach = 2 + int(np.ceil(amplitude / 2 * k_d / (abs(normal[axis]) * pitch[axis])))
@@ -66,7 +66,7 @@ def residual_mm(mask, pitch, axis, others, u, v, height, normal, amplitude, shif
 
 
 def rms_um(residual, pitch, axis, others, normal, spread):
-    """After the spread, whose distances are those on the facet."""
+    """Returns the root mean square after the spread. Its distances are measured on the facet."""
     slope = [-normal[a] / normal[axis] for a in others]
     metric = np.linalg.inv(np.eye(2) + np.outer(slope, slope))
     f, g = np.meshgrid(*(np.fft.fftfreq(n, pitch[a]) for n, a in zip(residual.shape, others)), indexing="ij")
@@ -77,7 +77,7 @@ def rms_um(residual, pitch, axis, others, normal, spread):
 
 
 def facets(pitch):
-    """(name, axis of the columns, unit normal, phase, where the tile begins), the same in every run."""
+    """Yields (name, axis of the columns, unit normal, phase, origin of the tile), the same in every run."""
     draw = np.random.default_rng(1)
     for tilt in TILTS:
         for axis in range(3):

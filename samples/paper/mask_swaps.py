@@ -1,13 +1,13 @@
 #!/usr/bin/python3
-"""Swaps thresholds of a mask so that its facets lose low frequencies: mask_swaps.py IN.vdb OUT.vdb NORMALS REACH ROUNDS [SEED]
+"""Swaps thresholds of a mask to reduce low frequencies on its facets: mask_swaps.py IN.vdb OUT.vdb NORMALS REACH ROUNDS [SEED]
 
 NORMALS: `all` (the half sphere, 10° apart), `axes` (0.5° … 8° off the lattice axes) or `both` (half of either).
-REACH:   the largest difference of two thresholds that are swapped; 1 is any.
+REACH:   the maximum difference of two thresholds that are swapped; 1 allows any.
 
 The objective is the power of the grey mask on the voxel planes of those normals, below a Gaussian low-pass of 2.3 voxels, over
 all positions of the plane. Two voxels at the offset d lie on a common plane along the axis z with the probability
-max(0, 1 - |d_z - s·d_x - t·d_y|), so the objective is a sum of m(u)·m(v)·K(v - u) over all pairs, and what a swap changes
-follows from the field m * K. A round tries pairs drawn at random, few enough to hardly touch each other.
+max(0, 1 - |d_z - s·d_x - t·d_y|). The objective is therefore a sum of m(u)·m(v)·K(v - u) over all pairs, and the field m * K
+gives the change by a swap. A round tries random pairs; they are few enough to hardly affect each other.
 """
 
 import sys
@@ -37,7 +37,7 @@ def kernel(size, kind):
         for tilt, turn, weight in normals(kind):
             s, t = np.tan(np.radians(tilt)) * np.array([np.cos(np.radians(turn)), np.sin(np.radians(turn))])
             if max(abs(s), abs(t)) > 1:
-                continue  # another axis is the dominant one
+                continue  # another axis is dominant
             rise = s * x + t * y
             total += weight * np.exp(-(x * x + y * y + rise * rise) / (4 * SPREAD**2)) * np.maximum(0, 1 - np.abs(z - rise))
     return total

@@ -100,7 +100,7 @@ def figure_4(masks):
             spectrum = masks[sigma][0]
             frequency = (np.arange(spectrum["bands"]) + 0.5) / (2 * spectrum["bands"])
             axis.plot(frequency, curve(spectrum), label=f"σ = {sigma}", linewidth=1)
-        top = 2 if "mean" in title else 4  # the greatest of σ = 0.5 goes far beyond
+        top = 2 if "mean" in title else 4  # the maximum of σ = 0.5 is far above
         axis.set(title=title, xlabel="cycles per voxel", ylabel="power, white noise = 1", ylim=(0, top))
     axes[0, 0].legend(ncol=2)
     table = {sigma: mean_and_spread([figures_of(s) for s in seeds]) for sigma, seeds in masks.items()}

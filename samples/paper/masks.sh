@@ -1,6 +1,6 @@
 #!/bin/sh
-# Makes masks of 32³ for σ = 0.5 … 3.1 and measures their slices, as section 4 of the paper does; masks.py draws the
-# figures and writes their numbers. A finished measurement is kept: the script can be stopped and started again.
+# Makes masks of 32³ for σ = 0.5 … 3.1 and measures their slices, as section 4 of the paper does. masks.py draws the
+# figures and writes their numbers. Finished measurements are not repeated; the script can be interrupted and continued.
 #   samples/paper/masks.sh [WORK FOLDER] [RESULT FOLDER] [STEP IN DEGREES] [SEEDS] [KERNELS]
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)

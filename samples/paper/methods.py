@@ -1,4 +1,4 @@
-"""What the scripts of the paper's figures share: the methods, and how a chain is run."""
+"""Shared by the scripts of the figures of the paper: the methods, and running a chain."""
 
 import os
 import pathlib
@@ -9,7 +9,7 @@ PRINTER = "mimaki-3duj-553"
 PAPER = "dither --preset paper"
 BLUE = f"{PAPER} --size 64 --sigma"
 
-# What stands between mesh2sdf and the print, and the options of mesh2sdf.
+# By name: the options of mesh2sdf, and the stages between mesh2sdf and the print.
 METHODS = {
     "control": ([], "dither --mask none"),
     "interlacing": (["--refine-y", "2"], "interlace"),
@@ -28,13 +28,13 @@ def file_name(words):
 
 
 def program(folder, *words):
-    """The first `vdbdither` on the PATH, quietly, in `folder`; what it prints."""
+    """Runs the first `vdbdither` on the PATH in `folder`. Returns its standard output."""
     return subprocess.run(["vdbdither", *map(str, words)], cwd=folder, check=True, stdout=subprocess.PIPE,
                           env={**os.environ, "LC_ALL": "C.UTF-8"}).stdout
 
 
 def chain(folder, mesh, method, *rest, pitch=None):
-    """mesh2sdf ! the method ! `rest`, a chain in words."""
+    """Runs mesh2sdf ! the method ! `rest`, where `rest` is text."""
     refine, step = method
     lattice = ["--pitch", pitch] if pitch else ["--printer", PRINTER]
     return program(folder, "mesh2sdf", mesh, *lattice, *refine, "!", *step.split(), *" ".join(rest).split(), "--quiet")

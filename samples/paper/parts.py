@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""The parts that the figures print, each a closed mesh made from formulas.
+"""Makes the parts of the figures. Each is a closed mesh made from formulas.
 
     samples/paper/parts.py FOLDER
 
-Writes cube.stl, sphere.stl, relief.stl and figurine.stl into FOLDER; the cubes and spheres of figures 8 and 9 are made by
-them. Lengths are mm.
+Writes cube.stl, sphere.stl, relief.stl and figurine.stl into FOLDER. Figures 8 and 9 use the functions `cube` and `sphere` with
+other sizes. Lengths are in mm.
 """
 
 import math
@@ -16,7 +16,7 @@ import numpy
 
 
 def cube(side):
-    """About the origin, turned by 2 degrees about x, then y, then z."""
+    """A cube about the origin, turned by 2 degrees about x, then y, then z."""
     half = side / 2
     corners = [[x, y, z] for z in (-half, half) for y in (-half, half) for x in (-half, half)]
     c, s = math.cos(math.radians(2)), math.sin(math.radians(2))
@@ -28,7 +28,7 @@ def cube(side):
 
 
 def sphere(radius, steps=240):
-    """About the origin, so fine that its facets do not show."""
+    """A sphere about the origin, with facets too small to be visible."""
     def at(i, j):
         polar, around = math.pi * i / steps, math.pi * j / steps
         if i in (0, steps):
@@ -47,7 +47,7 @@ def sphere(radius, steps=240):
 
 
 def relief(side=14.0, steps=200):
-    """A plate whose top rises and falls by slopes of up to 8 degrees."""
+    """A plate whose top has slopes of up to 8 degrees."""
     line = numpy.linspace(-side / 2, side / 2, steps + 1)
     x, y = numpy.meshgrid(line, line)
     away = numpy.hypot(x, y)
@@ -70,8 +70,8 @@ def relief(side=14.0, steps=200):
 
 
 def figurine():
-    """A sitting cat of 16 mm: ellipsoids and bent limbs that run into each other."""
-    import pyopenvdb  # Debian's python3-openvdb, needed by this part alone
+    """A sitting cat of 16 mm, made of blended ellipsoids and limbs."""
+    import pyopenvdb  # Debian's python3-openvdb, needed only for this part
 
     spacing = 0.08
     low, high = numpy.array([-5.2, -6.0, -0.4]), numpy.array([5.2, 6.0, 16.4])

@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""Pictures of simulated prints side by side: the README's first, and what the paper shows in its figures 1 and 10 to 14.
+"""Renders simulated prints side by side: the picture of the README, and figures 1 and 10 to 14 of the paper.
 
     samples/paper/pictures.py [WORK FOLDER] [RESULT FOLDER] [PART] [METHOD]
 
-PART is token (the README's: docs/images/prints.png beside the RESULT FOLDER), cube, sphere, relief, figurine, or all. What is
-finished in the work folder is kept; a METHOD is printed anew. The program is the first `vdbdither` on the PATH.
+PART is token (for the README: images/prints.png beside the RESULT FOLDER), cube, sphere, relief, figurine, or all. Finished
+pictures in the work folder are not repeated, except for METHOD. The program is the first `vdbdither` on the PATH.
 """
 
 import pathlib
@@ -23,7 +23,7 @@ LOW = ("--look", "staircase", "--brightness", "0.18")
 DIFFUSE = ("--look", "area")
 ROWS = {"droplets of 50 µm, light from the side": ("droplets", LOW), "droplets of 50 µm, light from above": ("droplets", DIFFUSE),
         "160 times smoothed, light from the side": ("smoothed", LOW)}
-# The view, and what of the picture is shown: left, top, right, bottom, as shares.
+# The view, and the part of the picture that is shown: left, top, right, bottom, as shares.
 VIEWS = {"token": (("--azimuth", "30", "--elevation", "45", "--pixel", "0.03mm"), (0.09, 0.085, 0.545, 0.885)),
          "cube": (("--pixel", "0.05mm"), (0, 0, 1, 1)), "sphere": (("--pixel", "0.035mm"), (0, 0, 1, 1)),
          "relief": (("--azimuth", "20", "--elevation", "55", "--pixel", "0.06mm"), (0, 0, 1, 1)),
@@ -35,13 +35,13 @@ result = pathlib.Path(sys.argv[2]).resolve() if len(sys.argv) > 2 else RESULT
 which = sys.argv[3] if len(sys.argv) > 3 else "all"
 anew = sys.argv[4] if len(sys.argv) > 4 else None
 if which not in (*VIEWS, "all"):
-    raise SystemExit(f"pictures: there is no part '{which}'; there are {', '.join(VIEWS)} and all")
+    raise SystemExit(f"pictures: unknown part '{which}'; use {', '.join(VIEWS)} or all")
 work.mkdir(parents=True, exist_ok=True)
 font = ImageFont.truetype(matplotlib.get_data_path() + "/fonts/ttf/DejaVuSans.ttf", 14)
 
 
 def renewed(part, name, process, looks):
-    """The pictures of one print under several lights: made where one is missing."""
+    """Returns the files of the pictures of one print under several lights. Makes them if one is missing."""
     files = [f"{file_name(f'{part}-{process}-{name}')}-{look[1]}.png" for look in looks]
     if name == anew or not all((work / file).exists() for file in files):
         mesh = f"{part}-print.ply"
@@ -54,7 +54,7 @@ def renewed(part, name, process, looks):
 
 
 def shown(part, file):
-    """What the view shows of a picture, before grey."""
+    """Returns the shown part of a picture, on grey."""
     with Image.open(work / file) as picture:
         picture = picture.convert("RGBA")
     ground = Image.new("RGBA", picture.size, (GREY, GREY, GREY, 255))

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Tables and figures of docs/evaluation.md from what dither_quality_bench printed.
+"""Makes the tables and figures of docs/evaluation.md from the output of dither_quality_bench.
 
     quality.py RESULT_FOLDER FILE.jsonl …
 
@@ -95,7 +95,7 @@ if worse:
 for method in SHOWN:
     of = [abs(row["bias"]) / row["diameter"] for key in facets for row in facets[key].get(method, [])]
     if of:
-        print(f"bias of {method}: {100 * np.mean(of):.2f} % of a voxel diameter in the mean, {100 * max(of):.1f} % at most")
+        print(f"bias of {method}: {100 * np.mean(of):.2f} % of a voxel diameter on average, at most {100 * max(of):.1f} %")
 print()
 
 if facets:
@@ -189,7 +189,7 @@ if heights:
     figure, axes = plt.subplots(len(methods), 2, figsize=(8, 1.9 * len(methods)))
     for row in heights:
         ax = axes[methods.index(row["method"]), 0 if row["axis"] == 2 else 1]
-        # Lit from the left at a grazing angle: the slope is what the eye sees.
+        # Under grazing light from the left the eye sees the slope.
         um = np.array(row["um"]).reshape(row["rows"], -1)
         ax.imshow(-np.gradient(um, 40, axis=1), cmap="gray", vmin=-0.12, vmax=0.12, interpolation="bilinear")
         ax.set_axis_off()

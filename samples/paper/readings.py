@@ -1,13 +1,13 @@
 #!/usr/bin/python3
-"""Varies what the paper leaves open, and measures what it changes: which voxels are ∂V, where f is read, how wide the band
-is, and how normals are found.
+"""Varies the choices that the paper leaves open, and measures their effect: the voxels of ∂V, the place where f is read, the
+width of the band, and the source of the normals.
 
     samples/paper/readings.py [WORK FOLDER] [RESULT FOLDER]
 
-A small reference in numpy, independent of the program but for the mask: facets tilted by 2, 10 and 30 degrees off each axis, and a
-sphere, whose distance is known exactly, dithered with the constant 4 on voxels of 42 x 84 x 22 µm. The error is that of the half
-level after a Gaussian of 50 µm. Then the program itself, for what its options vary: a cube at 2 degrees and a sphere by
-`measure`. The program is the first `vdbdither` on the PATH. Writes readings.json and the tables of readings.md.
+A small reference in numpy, which shares only the mask with the program, dithers facets tilted by 2, 10 and 30 degrees off each
+axis, and a sphere, with the constant 4 on voxels of 42 x 84 x 22 µm. Their distances are known exactly. The error is that of the
+half level after a Gaussian of 50 µm. Then `measure` compares the options of the program itself on a cube at 2 degrees and a
+sphere. The program is the first `vdbdither` on the PATH. Writes readings.json and the tables of readings.md.
 """
 
 import itertools
@@ -40,7 +40,7 @@ ALL_26 = [o for o in itertools.product((-1, 0, 1), repeat=3) if any(o)]
 
 
 def moved(array, offset, outside):
-    """array[index + offset], with `outside` beyond the ends."""
+    """Returns array[index + offset], with `outside` beyond the ends."""
     out = numpy.full_like(array, outside)
     to, of = [], []
     for o, n in zip(offset, array.shape):
@@ -51,12 +51,12 @@ def moved(array, offset, outside):
 
 
 def beside(inside, neighbours):
-    """Where a neighbour is true."""
+    """Returns where a neighbour is true."""
     return numpy.logical_or.reduce([moved(inside, o, False) for o in neighbours])
 
 
 class Shape:
-    """Distances in mm and outward normals at voxel centres; points of the true surface, and their curvature's share."""
+    """Distances in mm and outward normals at voxel centres; points of the true surface, and the shift by its curvature."""
 
     def __init__(self, low, high, distance, normal, surface, shift_mm=0.0):
         self.first = numpy.floor(numpy.array(low) / PITCH).astype(int)
@@ -68,7 +68,7 @@ class Shape:
 
 
 def facet(axis, tilt, position, seed):
-    """A plane through a box of 2.6 mm, on whose middle the error is taken."""
+    """A plane through a box of 2.6 mm. The error is measured in the middle of the box."""
     azimuth = math.radians(40)
     direction = numpy.zeros(3)
     direction[axis] = math.cos(math.radians(tilt))
@@ -102,7 +102,7 @@ def by_differences(distance):
 
 
 def boundary(inside, kind):
-    """∂V by a reading: its side and its neighbours."""
+    """Returns ∂V by a reading: its side and its neighbours."""
     side, neighbours = kind.split()
     near = SIX if neighbours == "6" else ALL_26
     inner, outer = inside & beside(~inside, near), ~inside & beside(inside, near)
@@ -110,8 +110,8 @@ def boundary(inside, kind):
 
 
 def read_at_closest(values, surface, wanted):
-    """For each index of `wanted`, values at the nearest voxel of `surface`; ties go to the smallest (k, j, i). Zero where there is
-    none within the radius."""
+    """Returns, for each index of `wanted`, the value at the nearest voxel of `surface`; ties go to the smallest (k, j, i). The
+    value is zero if there is none within the radius."""
     reach = numpy.array([int(RADIUS_MM / p) for p in PITCH])
     offsets = sorted((sum((o * p) ** 2 for o, p in zip((i, j, k), PITCH)), k, j, i)
                      for k in range(-reach[2], reach[2] + 1) for j in range(-reach[1], reach[1] + 1)
@@ -134,7 +134,7 @@ def dithered(shape, tile, where="closest", kind="inner 6", diameters=None, norma
     half_diameter = 1 / (2 * numpy.max(numpy.abs(normal) / PITCH, axis=-1))
     index = numpy.ix_(*((numpy.arange(n) + f) % tile.shape[a] for a, (n, f) in enumerate(zip(d.shape, shape.first))))
     noise = (tile[index] - 0.5).astype(float)
-    near = numpy.abs(d) < numpy.linalg.norm(PITCH)  # nowhere is f greater
+    near = numpy.abs(d) < numpy.linalg.norm(PITCH)  # |f| is smaller elsewhere
     wanted = numpy.argwhere(near)
     f = constant * half_diameter * noise
     if where == "closest":
@@ -150,7 +150,7 @@ def dithered(shape, tile, where="closest", kind="inner 6", diameters=None, norma
 
 
 def blurred(solid):
-    """The share of material after the Gaussian, each voxel a box; beyond the box, as at its wall."""
+    """Returns the share of material after the Gaussian. Voxels are boxes; values beyond the ends repeat."""
     out = solid.astype(float)
     for axis, pitch in enumerate(PITCH):
         reach = math.ceil(4 * SPREAD_MM / pitch)
@@ -161,8 +161,8 @@ def blurred(solid):
 
 
 def errors(shape, solid):
-    """How far the half level lies outside the true surface at its points, mm: the spread times the quantile of the share of
-    material there, exact for planes."""
+    """Returns the distance of the half level outside the true surface at its points, mm: the spread times the quantile of the
+    share of material there. This is exact for planes."""
     share_of_material = numpy.clip(blurred(solid), 1e-6, 1 - 1e-6)
     place = shape.surface / PITCH - shape.first
     low = numpy.floor(place).astype(int)
@@ -175,7 +175,7 @@ def errors(shape, solid):
 
 
 def pieces(inside, neighbours):
-    """Labels of connected pieces, and how many there are."""
+    """Returns labels of connected pieces, and their number."""
     label = numpy.where(inside, numpy.arange(1, inside.size + 1).reshape(inside.shape), 0)
     while True:
         best = label
@@ -190,7 +190,7 @@ def pieces(inside, neighbours):
 
 
 VARIANTS = {
-    "∂V inner, 6 neighbours (ours)": {}, "∂V inner, 26": {"kind": "inner 26"}, "∂V outer, 6": {"kind": "outer 6"},
+    "∂V inner, 6 neighbours (vdbdither)": {}, "∂V inner, 26": {"kind": "inner 26"}, "∂V outer, 6": {"kind": "outer 6"},
     "∂V outer, 26": {"kind": "outer 26"}, "∂V both, 6": {"kind": "both 6"},
     "M at v̄, k_D at v": {"own_diameter": True}, "f at the foot": {"where": "foot"}, "f at v": {"where": "voxel"},
     "band of half a diameter": {"diameters": 0.5}, "band of one diameter": {"diameters": 1.0},
@@ -199,7 +199,7 @@ VARIANTS = {
 
 
 def reference():
-    """Mean error by facet and on the sphere, µm; what floats and what is hollow."""
+    """Returns, by variant, the mean error on facets and on the sphere, µm, and the numbers of components and cavities."""
     program(work, "mask", "--size", "64", "--sigma", "1.1", "-o", "paper.vdb", "--overwrite", "--quiet")
     tile = numpy.zeros((64, 64, 64), dtype=numpy.float32)
     pyopenvdb.read(str(work / "paper.vdb"), "mask").copyToArray(tile)
@@ -233,7 +233,7 @@ PROGRAM = {
 
 
 def by_program():
-    """What the options of the program vary, on a cube of 8 mm and a sphere of 5 mm."""
+    """Returns the effect of options of the program, on a cube of 8 mm and a sphere of 5 mm."""
     parts.write_stl(work / "cube.stl", parts.cube(8.0))
     parts.write_stl(work / "sphere.stl", parts.sphere(2.5))
     table = {}
@@ -259,8 +259,8 @@ def page(reference_table, program_table):
         figures = [f"{row[key]:.2f}" for key in ("2 degrees", "10 degrees", "30 degrees", "sphere")]
         lists = [", ".join(map(str, row[key])) for key in ("components", "by faces", "cavities")]
         yield f"| {name} | " + " | ".join([*figures, f"{row['sphere, bias']:+.2f}", *lists]) + " |"
-    yield "\nBy the program: mean error / 99th percentile / bias in µm, components / cavities:\n"
-    yield "| `dither --preset paper`, | cube of 8 mm, 2° | sphere of 5 mm |\n| --- | --- | --- |"
+    yield "\nWith the program: mean error / 99th percentile / bias in µm, components / cavities:\n"
+    yield "| `dither --preset paper` | cube of 8 mm, 2° | sphere of 5 mm |\n| --- | --- | --- |"
     for name, row in program_table.items():
         yield f"| {name} | " + " | ".join(f"{of['mean']:.2f} / {of['p99']:.1f} / {of['bias']:+.2f}, "
                                           f"{of['components']} / {of['cavities']}" for of in row.values()) + " |"
@@ -270,5 +270,5 @@ tables = reference(), by_program()
 (result / "readings.json").write_text(json.dumps({"reference": tables[0], "program": tables[1]}, indent=1,
                                           ensure_ascii=False) + "\n")
 path = result / "readings.md"
-text = path.read_text() if path.exists() else "# Where the paper can be read in two ways\n\n<!-- tables -->\n"
+text = path.read_text() if path.exists() else "# Ambiguities in the paper\n\n<!-- tables -->\n"
 path.write_text(text.split("<!-- tables -->")[0] + "<!-- tables -->\n\n" + "\n".join(page(*tables)) + "\n")

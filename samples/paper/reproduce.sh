@@ -1,14 +1,14 @@
 #!/bin/sh
-# Makes the figures and tables of docs/paper again: section 5 of "Shape Dithering for 3D Printing" (Morsy, Brunton, Urban 2022).
+# Repeats the figures and tables of docs/paper: section 5 of "Shape Dithering for 3D Printing" (Morsy, Brunton, Urban 2022).
 #
 #   samples/paper/reproduce.sh              # every step but masks
 #   samples/paper/reproduce.sh STEP ...     # some of: figure8 figure9 readings pictures speed masks
-#   samples/paper/reproduce.sh default      # figure8, figure9 and pictures, measuring anew only what `dither` does by default
+#   samples/paper/reproduce.sh default      # figure8, figure9 and pictures, only for the default of `dither`
 #
-# A finished measurement is kept in out/ ($WORK) and used again: a run can be stopped and taken up. To measure all of a step
-# anew, remove its folder there. Results go to docs/paper ($RESULT), the README's picture to images/ beside that. Times are
-# worth something only on a machine that does nothing else; $SPEED_MESH, $SPEED_SIZE (mm) and $ROUNDS set what is timed. The
-# program is that of build/release, or else the first `vdbdither` on the PATH. Needs python3-numpy, -pil, -matplotlib, -openvdb.
+# Finished measurements stay in out/ ($WORK) and are not repeated; a run can be interrupted and continued. To repeat a whole
+# step, remove its folder there. Results are written to docs/paper ($RESULT), and the picture of the README to images/ beside
+# it. Times are meaningful only on a machine without other work; $SPEED_MESH, $SPEED_SIZE (mm) and $ROUNDS select the job. The
+# program is that of build/release, or the first `vdbdither` on the PATH. Needs python3-numpy, -pil, -matplotlib, -openvdb.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)
@@ -40,10 +40,10 @@ of_default() {
 for step in "$@"; do
   case $step in
     figure8 | figure9 | readings | pictures | speed | masks | default) ;;
-    *) echo "reproduce.sh: there is no step '$step'; there are figure8 figure9 readings pictures speed masks default" >&2; exit 2 ;;
+    *) echo "reproduce.sh: unknown step '$step'; use figure8 figure9 readings pictures speed masks default" >&2; exit 2 ;;
   esac
 done
-command -v vdbdither > /dev/null || { echo "reproduce.sh: there is no vdbdither; build it first, see README.md" >&2; exit 1; }
+command -v vdbdither > /dev/null || { echo "reproduce.sh: vdbdither not found; build it first, see README.md" >&2; exit 1; }
 mkdir -p "$work" "$result"
 for step in "$@"; do
   began=$(date +%s)

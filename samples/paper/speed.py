@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Times mesh → finished RGBA stack with every method in turn, the paper's figure 7, and draws it.
+"""Times mesh → finished RGBA stack with every method in turn, and draws the result: figure 7 of the paper.
 
     samples/paper/speed.py MESH SIZE_MM [ROUNDS] [RESULT FOLDER]
 
-A round runs every method once, in an order of its own, so that a busy spell of the machine meets them all alike; what a
-method adds is the median over the rounds of its quotient to the control of the same round. The program is the first
-`vdbdither` on the PATH. Writes figure-7.json and figure-7.png.
+A round runs every method once, in a random order, to spread other load of the machine over all methods. The cost of a method
+is the median over the rounds of its quotient to the control of the same round. The program is the first `vdbdither` on the
+PATH. Writes figure-7.json and figure-7.png.
 """
 
 import json
@@ -29,7 +29,7 @@ CONTROL = "control"
 
 
 def methods(folder):
-    """What stands between mesh2sdf and the slices, and the options of mesh2sdf."""
+    """Returns, by name, the options of mesh2sdf and the stages between mesh2sdf and the slices."""
     masks = {}
     for sigma in ("1.1", "2.5"):
         masks[sigma] = folder / f"blue-{sigma}.vdb"
@@ -48,7 +48,7 @@ def methods(folder):
 
 
 def run(mesh, size_mm, method, folder):
-    """Wall seconds, CPU seconds, peak memory in bytes and the report of one run."""
+    """Returns elapsed seconds, CPU seconds, peak memory in bytes and voxels of the box of one run."""
     refine, step = method
     stack = folder / "stack"
     shutil.rmtree(stack, ignore_errors=True)
@@ -68,7 +68,7 @@ def run(mesh, size_mm, method, folder):
 
 
 def summary(runs):
-    """Medians and spread of every method, and its quotients to the control of the same round."""
+    """Returns medians and deviations of every method, and its quotients to the control of the same round."""
     control = runs[CONTROL]
     table = {}
     for name, of in runs.items():
@@ -107,7 +107,7 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         of = methods(folder)
-        run(mesh, size_mm, of[CONTROL], folder)  # what comes first also pays for a cold disk
+        run(mesh, size_mm, of[CONTROL], folder)  # the first run also pays for a cold disk
         runs = {name: [] for name in of}
         for turn in range(rounds):
             for name in random.Random(turn).sample(list(of), len(of)):

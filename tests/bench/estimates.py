@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Holds the time that --explain promises against what runs take.
+"""Compares the time that --explain expects with the time of runs.
 
     tests/bench/estimates.py MESH ... [--sizes 20,60,120]
 
-A line for each mesh, size and chain: CPU time in all, what was promised of it, their quotient; then the same for every stage.
+A line for each mesh, size and chain: total CPU time, the expected time, and their quotient; then the same for every stage.
 """
 
 import argparse
@@ -31,7 +31,7 @@ for mesh in given.meshes:
     for size in given.sizes.split(","):
         for chain in CHAINS:
             stages = run(mesh.resolve(), size, chain)
-            took, promised = (sum(stage[key] for stage in stages) for key in ("cpu_seconds", "expected_cpu_seconds"))
-            print(f"{mesh.stem} {size} mm, {chain}: {took:.2f} s, promised {promised:.2f} s, {promised / took:.2f}")
+            took, expected = (sum(stage[key] for stage in stages) for key in ("cpu_seconds", "expected_cpu_seconds"))
+            print(f"{mesh.stem} {size} mm, {chain}: {took:.2f} s, expected {expected:.2f} s, {expected / took:.2f}")
             for stage in stages:
                 print(f"    {stage['name']:16} {stage['cpu_seconds']:8.2f} {stage['expected_cpu_seconds']:8.2f}")

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Runs ours and openvdb::tools::meshToVolume in turn, in one process, and prints the ratios as a table.
+"""Runs mesh2sdf and openvdb::tools::meshToVolume in turn, in one process, and prints the ratios as a table.
 
 mesh2sdf.py PROGRAM SIZE_MM mesh ...     (PROGRAM is build/release/tests/mesh_distance_bench)
 """

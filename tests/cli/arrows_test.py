@@ -1,4 +1,4 @@
-"""Includes follow the arrows ops -> io -> vdbdither and ops -> ops/kernels -> vdbdither/model; families form no circle."""
+"""Includes go ops -> io -> vdbdither and ops -> ops/kernels -> vdbdither/model, and never form a circle between families."""
 
 import graphlib
 import pathlib
@@ -9,12 +9,12 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def included(path):
-    """The files of the project that a source names in its includes."""
+    """Returns the files of the project that a source includes."""
     return re.findall(r'^\s*#\s*include\s*["<]((?:vdbdither|io|ops|tests)/[^">]+)', path.read_text(), re.MULTILINE)
 
 
 def sources(folder, below=True):
-    """The sources in a folder, and those in the folders below it."""
+    """Returns the sources in a folder and, if `below`, in the folders below it."""
     found = [path for path in sorted((ROOT / folder).glob("**/*" if below else "*")) if path.suffix in (".h", ".cpp")]
     return found
 
@@ -25,7 +25,7 @@ def families(folder):
 
 class Arrows(unittest.TestCase):
     def assert_includes(self, folder, *allowed, below=True):
-        """Every include of every source in `folder` begins with one of `allowed`."""
+        """Checks that every include in `folder` begins with one of `allowed`."""
         paths = sources(folder, below)
         self.assertTrue(paths)
         for path in paths:
@@ -33,7 +33,7 @@ class Arrows(unittest.TestCase):
                 self.assertTrue(name.startswith(allowed), f"{path.relative_to(ROOT)} includes {name}")
 
     def assert_no_circle(self, folder):
-        """The families of a folder include one another in one direction."""
+        """Checks that the families of a folder include each other in one direction."""
         arrows = {}
         for family in families(folder):
             named = {name for path in sources(f"{folder}/{family}") for name in included(path)}

@@ -1,4 +1,4 @@
-"""A chain gives the same slices however it is run."""
+"""A chain gives the same slices in every way to run it."""
 
 import itertools
 import json
@@ -13,16 +13,16 @@ from program import ProgramTest
 
 class Chain(ProgramTest):
     def chain(self, printer, mesh, arguments=""):
-        """The main chain, its stages written apart."""
+        """Returns the stages of the main chain."""
         return [f"mesh2sdf {mesh} --printer {printer} {arguments}", "normals", "dither", "material-assign"]
 
     def sums(self, line):
-        """The SHA-256 of every slice that a line of bash writes into the folder `out`."""
+        """Returns the SHA-256 of every slice that a line of bash writes into the folder `out`."""
         self.shell(f"rm -rf out && {line}")
         return stack.sums(self.folder / "out")
 
     def ways(self, stages, slab, threads):
-        """Lines of bash that write the same slices into the folder `out`."""
+        """Returns lines of bash that write the same slices into the folder `out`."""
         common = f"--slab {slab} --threads {threads}"
         export = f"slice-export out {common}"
         each = [f"{stage} {common}" for stage in stages]
@@ -39,7 +39,7 @@ class Chain(ProgramTest):
         }
 
     def assert_all_agree(self, stages, settings):
-        """Returns the sums that every way gives with every slab height and count of threads of `settings`."""
+        """Checks that all ways give the same sums with all slab heights and numbers of threads in `settings`. Returns the sums."""
         reference = None
         for slab, threads in settings:
             for way, line in self.ways(stages, slab, threads).items():
@@ -55,7 +55,7 @@ class Chain(ProgramTest):
         stack.check(self.folder / "out")
         self.assertGreater(len(set(slices)), 30)
 
-    def test_several_meshes_get_a_material_each(self):
+    def test_each_of_several_meshes_gets_its_material(self):
         meshes.write_stl(self.folder / "left.stl", meshes.box((1, 1, 1)))
         meshes.write_stl(self.folder / "right.stl", meshes.box((2, 1, 1), (1.2, 0, 0)))
         self.succeed("mesh2sdf", "left.stl", "right.stl", "--printer", "mimaki-3duj-553", "!", "dither", "--mask", "none",
@@ -96,7 +96,7 @@ class Chain(ProgramTest):
         self.succeed("slice-import", "out", "-o", "again.vdb")
         self.succeed("run", "mesh2sdf plate.stl --printer mimaki-3duj-553 --place ! dither --mask none ! compare again.vdb --grids solid")
 
-    @unittest.skipUnless("VDBDITHER_MODELS" in os.environ, "VDBDITHER_MODELS names no folder of models")
+    @unittest.skipUnless("VDBDITHER_MODELS" in os.environ, "VDBDITHER_MODELS is not set to a folder of models")
     def test_every_way_agrees_on_a_scan_of_40_mm(self):
         mesh = pathlib.Path(os.environ["VDBDITHER_MODELS"]) / "classic/armadillo.obj"
         for printer in ("mimaki-3duj-553", "stratasys-j750-27um"):

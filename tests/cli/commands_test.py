@@ -1,4 +1,4 @@
-"""What the command line says, and what it refuses."""
+"""Output and refusals of the command line."""
 
 import json
 import os
@@ -14,13 +14,13 @@ def operators():
 
 
 def read_terminal(descriptor):
-    """What was written to the other end, which is closed; closes this one."""
+    """Returns the output of a terminal whose other end is closed. Closes this end."""
     text = b""
     with open(descriptor, "rb", buffering=0) as terminal:
         try:
             while chunk := terminal.read(4096):
                 text += chunk
-        except OSError:  # how Linux tells that the other end has closed
+        except OSError:  # Linux reports a closed other end in this way
             pass
     return text
 
@@ -49,11 +49,11 @@ class Words(ProgramTest):
             for expected in ("Example:\n  vdbdither ", "--threads N", "--layers A:B", "--help"):
                 self.assertIn(expected, text, name)
 
-    def test_version_is_known_behind_every_operator(self):
+    def test_version_is_accepted_by_every_operator(self):
         for name in operators():
             self.assertEqual(self.succeed(name, "--version"), self.succeed("--version"), name)
 
-    def test_explain_tells_stages_and_cost_and_makes_nothing(self):
+    def test_explain_reports_stages_and_cost_and_makes_nothing(self):
         text = self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "normals", "!", "dither", "!", "material-assign", "!",
                             "slice-export", "out", "--explain").decode()
         for pattern in (r"lattice +0\.042 x 0\.084 x 0\.022 mm, \d+ x \d+ x \d+ voxels", r"layers +(\d+) of \1, in slabs of \d+",
@@ -62,7 +62,7 @@ class Words(ProgramTest):
             self.assertRegex(text, pattern)
         self.assertEqual(self.listing(), self.inputs)
 
-    def test_explain_announces_barriers(self):
+    def test_explain_reports_barriers(self):
         text = self.succeed("mesh2sdf", "part.stl", *MIMAKI, "-o", "a.vdb", "--explain").decode()
         self.assertRegex(text, r"stage +write a\.vdb +\(barrier")
         self.assertEqual(self.listing(), self.inputs)
@@ -128,7 +128,7 @@ class Words(ProgramTest):
         for name in ("mesh2sdf", "dither", "write"):
             self.assertRegex(done.stderr.decode(), rf"(?m)^{name} +[\d.]+ s +\d+ voxels")
 
-    def test_a_bar_shows_on_a_terminal_and_quiet_hides_it(self):
+    def test_a_terminal_shows_a_progress_bar_and_quiet_hides_it(self):
         meshes.write_stl(self.folder / "tall.stl", meshes.cylinder(3, 25))
         shown = {}
         for quiet in ((), ("--quiet",)):
@@ -142,7 +142,7 @@ class Words(ProgramTest):
         self.assertTrue(shown[()].endswith(b"\r\x1b[K"), "the bar is wiped away")
         self.assertEqual(shown[("--quiet",)], b"")
 
-    def test_a_long_run_tells_a_terminal_at_once_how_long_it_may_take(self):
+    def test_a_long_run_shows_its_expected_time_at_once_on_a_terminal(self):
         meshes.write_stl(self.folder / "ball.stl", meshes.sphere(4))
         self.succeed("mesh2sdf", "ball.stl", *MIMAKI, "-o", "surface.vdb")
         ours, theirs = pty.openpty()
@@ -162,7 +162,7 @@ class Refusals(ProgramTest):
         self.refuse(2, "no operator 'normal'; did you mean 'normals'?", "mesh2sdf", "part.stl", *MIMAKI, "!", "normal")
         self.refuse(2, "did you mean 'mesh2sdf'?", "help", "mesh2sfd")
 
-    def test_a_word_like_no_operator_is_told_them_all(self):
+    def test_an_unknown_word_without_a_near_operator_lists_all(self):
         done = self.refuse(2, "no operator 'xyzzyplugh'; the operators are", "xyzzyplugh")
         for name in operators():
             self.assertIn(f" {name}", done.stderr.decode())
@@ -181,7 +181,7 @@ class Refusals(ProgramTest):
         self.assertIn(done.returncode, (1, 2))
         self.refuse(done.returncode, "nothing.stl", "mesh2sdf", "nothing.stl", *MIMAKI, "-o", "x.vdb")
 
-    def test_a_mesh_that_is_none_is_bad_data(self):
+    def test_a_file_that_is_not_a_mesh_is_bad_data(self):
         (self.folder / "noise.stl").write_bytes(bytes(range(256)) * 9)
         self.refuse(1, "noise.stl", "mesh2sdf", "noise.stl", *MIMAKI, "-o", "x.vdb")
 
@@ -196,7 +196,7 @@ class Refusals(ProgramTest):
         self.succeed("mask", "--size", "8", "-o", "mask.vdb")
         self.refuse(1, "no grid 'surface'; there is 'mask'", "dither", "-i", "mask.vdb", "-o", "x.vdb")
 
-    def test_an_output_that_is_there_stays_without_overwrite(self):
+    def test_an_existing_output_stays_without_overwrite(self):
         self.succeed("mesh2sdf", "part.stl", *MIMAKI, "-o", "a.vdb")
         kept = (self.folder / "a.vdb").read_bytes()
         self.refuse(2, "'a.vdb' exists; --overwrite replaces it", "mask", "--size", "8", "-o", "a.vdb")
@@ -204,18 +204,18 @@ class Refusals(ProgramTest):
         self.succeed("mask", "--size", "8", "-o", "a.vdb", "--overwrite")
         self.assertNotEqual((self.folder / "a.vdb").read_bytes(), kept)
 
-    def test_a_stack_that_is_there_stays_without_overwrite(self):
+    def test_an_existing_stack_stays_without_overwrite(self):
         chain = ("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "out")
         self.succeed(*chain)
         self.refuse(2, "'out' exists; --overwrite replaces it", *chain)
         self.succeed(*chain, "--overwrite")
 
-    def test_a_folder_that_holds_no_stack_is_never_replaced(self):
+    def test_a_folder_without_a_stack_is_never_replaced(self):
         (self.folder / "holiday").mkdir()
         (self.folder / "holiday/beach.jpg").write_bytes(b"sand")
         self.refuse(2, "holiday", "mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "holiday", "--overwrite")
 
-    def test_an_output_in_no_folder_is_refused(self):
+    def test_an_output_in_a_missing_folder_is_refused(self):
         self.refuse(2, "there is no folder 'nowhere'", "mask", "--size", "8", "-o", "nowhere/a.vdb")
 
     def test_vdb_is_not_written_to_a_terminal(self):
@@ -224,7 +224,7 @@ class Refusals(ProgramTest):
         self.addCleanup(os.close, theirs)
         self.refuse(2, "not for a terminal", "mask", "--size", "8", stdout=theirs)
 
-    def test_vdb_is_not_awaited_from_a_terminal(self):
+    def test_vdb_is_not_read_from_a_terminal(self):
         ours, theirs = pty.openpty()
         self.addCleanup(os.close, ours)
         self.addCleanup(os.close, theirs)
@@ -238,7 +238,7 @@ class Refusals(ProgramTest):
     def test_more_memory_than_allowed_is_refused_before_the_run(self):
         self.refuse(1, "the job needs about", "mesh2sdf", "part.stl", *MIMAKI, "-o", "x.vdb", "--memory", "1MiB")
 
-    def test_layers_slab_and_memory_say_what_they_accept(self):
+    def test_layers_slab_and_memory_list_accepted_values(self):
         chain = ("mesh2sdf", "part.stl", *MIMAKI, "-o", "x.vdb")
         for text in ("5", "5:5", "9:2", "0:99999", "-1:4", "a:b", "1:2:3"):
             self.refuse(2, "is not A:B with 0 <= A < B <= ", *chain, f"--layers={text}")
@@ -256,7 +256,7 @@ class Refusals(ProgramTest):
         self.refuse(2, "run: takes one argument", "run")
         self.refuse(2, "is not closed", "run", "mesh2sdf 'part.stl")
 
-    def test_input_and_output_that_nobody_would_take_are_refused(self):
+    def test_unused_input_and_output_are_refused(self):
         self.refuse(2, "--input", "mesh2sdf", "part.stl", *MIMAKI, "-i", "a.vdb", "-o", "x.vdb")
         self.refuse(2, "--output", "mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "out", "-o", "x.vdb")
 

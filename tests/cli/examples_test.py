@@ -1,4 +1,4 @@
-"""Every example runs: those in the help, and the commands that README.md and docs show."""
+"""Every example runs: in the help texts, in README.md and in docs."""
 
 import os
 import re
@@ -12,12 +12,12 @@ from program import PROGRAM, ROOT, ProgramTest
 
 
 class Examples(ProgramTest):
-    def test_the_example_of_every_operator_runs_beside_a_part(self):
+    def test_the_example_of_every_operator_runs_with_a_part(self):
         links = sorted((PROGRAM.parent / "operators").iterdir())
         self.assertGreater(len(links), 5)
         for link in links:
             with self.subTest(operator=link.name):
-                # Each in a folder with nothing but a part.
+                # Each example runs in a folder that contains only a part.
                 self.doCleanups()
                 super().setUp()
                 meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
@@ -27,14 +27,14 @@ class Examples(ProgramTest):
                     self.assertTrue(line.strip().startswith("vdbdither "), example)
                     self.assertRegex(self.shell(f"{line} --explain").decode(), r"(?m)^time +about \d", line)
                     self.shell(line)
-                self.assertGreater(len(self.listing()), 1, "it makes something")
+                self.assertGreater(len(self.listing()), 1, "no output")
 
 
 class Documents(ProgramTest):
-    """The commands that README.md and docs show."""
+    """Runs the commands in README.md and docs."""
 
     def blocks(self, path):
-        """Indented blocks of commands of the program, and of it alone."""
+        """Yields the indented blocks that contain only commands of the program."""
         for block in re.findall(r"(?m)(?:^    .+\n)+", path.read_text()):
             lines = [line.split("  #")[0].strip() for line in re.sub(r"\\\n\s*", "", block).splitlines()]
             if all(line.split()[0] in ("vdbdither", "mesh2sdf") for line in lines):
@@ -48,8 +48,9 @@ class Documents(ProgramTest):
                     self.doCleanups()
                     super().setUp()
                     meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
+                    meshes.write_stl(self.folder / "lid.stl", meshes.box((0.6, 0.6, 0.4), (-0.3, -0.3, 0.9)))
                     for line in lines:
-                        # Ways to the same end are shown one below the other.
+                        # Several lines of a block can write the same stack.
                         if "slice-export out" in line:
                             shutil.rmtree(self.folder / "out", ignore_errors=True)
                         self.shell(line)

@@ -1,4 +1,4 @@
-"""Disks that fill up, folders that nobody may write, and what stands where something else was meant."""
+"""Full disks, folders without permission to write, and paths that are of the wrong kind."""
 
 import os
 import pathlib
@@ -14,7 +14,7 @@ from program import MIMAKI, PATIENCE, PROGRAM, ProgramTest
 
 
 class FullDisk(ProgramTest):
-    """Every output that fills its disk is refused in one line, whenever that happens, and what it was to replace stays."""
+    """An output that fills the disk fails with one line at any time, and the old output stays."""
 
     @classmethod
     def setUpClass(cls):
@@ -25,7 +25,7 @@ class FullDisk(ProgramTest):
         for line in (("mesh2sdf", "part.stl", *MIMAKI, "!", "normals", "!", "dither", "!", "material-assign", "-o", "part.vdb"),
                      ("mesh-export", "-i", "part.vdb", "print.ply")):
             subprocess.run([PROGRAM, *line], cwd=cls.inputs, check=True, timeout=120 * PATIENCE)
-        # Nobody estimates what comes by a pipe, so the runs begin.
+        # The size of piped data is unknown, so the runs start.
         cls.frames = subprocess.run([PROGRAM, "read", "part.vdb"], cwd=cls.inputs, check=True, timeout=120 * PATIENCE,
                                     stdout=subprocess.PIPE).stdout
 
@@ -42,7 +42,7 @@ class FullDisk(ProgramTest):
         subprocess.run(["mount", "-o", f"remount,size={kilobytes}k,nr_inodes={inodes}", self.disk], check=True)
 
     def fill(self, target, *arguments, sizes=(8, 16, 32, 64, 96), inodes=1000, **keywords):
-        """Runs with disks of some KiB, `target` being there already. Every run fails, one at least because its disk is full."""
+        """Runs with disks of some KiB and an existing `target`. Every run must fail, at least one because its disk is full."""
         old = self.disk / target
         if "." in target:
             old.write_bytes(b"old")
@@ -81,7 +81,7 @@ class FullDisk(ProgramTest):
         stack = self.folder / "stack"
         self.succeed("slice-export", "-i", self.inputs / "part.vdb", stack, "--format", "tiff")
         files = sum(1 for _ in stack.iterdir())
-        # The disk itself, the old folder and what is in it, the new one; then all files but one, or but two.
+        # Inodes: the disk, the old folder and its contents, the new folder; then all files except one or two.
         for missing in (1, 2):
             self.export("stack", "--format", "tiff", sizes=(4000,), inodes=4 + files - missing)
 
@@ -130,7 +130,7 @@ class InTheWay(ProgramTest):
         self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "-o", "part.vdb")
 
     def sinks(self, place):
-        """What writes every kind of output, named `place`/out…."""
+        """Returns arguments that write every kind of output, named `place`/out…."""
         read = ("-i", "part.vdb")
         return (("slice-export", *read, f"{place}/out"), ("slice-export", *read, f"{place}/out.zip"),
                 ("mesh-export", *read, f"{place}/out.stl"), ("read", "part.vdb", "!", "write", f"{place}/out.vdb"),
@@ -138,13 +138,13 @@ class InTheWay(ProgramTest):
                 ("measure", "part.stl", "--reference", "part.stl", "--report", f"{place}/out.json"),
                 ("measure", "part.stl", "--reference", "part.stl", "--map", f"{place}/out.ply"))
 
-    def test_a_folder_that_is_read_only_is_told(self):
+    def test_a_read_only_folder_is_reported(self):
         place = self.folder / "locked"
         place.mkdir()
         place.chmod(0o555)
         keywords = {}
         if os.geteuid() == 0:
-            # Nothing is locked to root.
+            # root may write everywhere.
             nobody = 65534
             for path in (self.folder, self.folder / "part.stl", self.folder / "part.vdb"):
                 path.chmod(0o755)
@@ -155,7 +155,7 @@ class InTheWay(ProgramTest):
         for arguments in self.sinks("locked"):
             self.refuse(1, "Permission denied", *arguments, **keywords)
 
-    def test_a_file_that_may_not_be_read_is_told(self):
+    def test_an_unreadable_file_is_reported(self):
         keywords = {}
         for name in ("part.stl", "part.vdb"):
             (self.folder / name).chmod(0)
@@ -167,7 +167,7 @@ class InTheWay(ProgramTest):
         self.refuse(1, "'part.stl': cannot be opened: Permission denied", "mesh2sdf", "part.stl", *MIMAKI, "-o", "x.vdb", **keywords)
         self.refuse(1, "cannot read 'part.vdb': Permission denied", "normals", "-i", "part.vdb", "-o", "x.vdb", **keywords)
 
-    def test_a_folder_in_place_of_a_file_is_told(self):
+    def test_a_folder_in_place_of_a_file_is_reported(self):
         for name in ("d", "d.vdb", "d.png", "d.json"):
             (self.folder / name).mkdir()
         chain = ("mesh2sdf", "part.stl", *MIMAKI, "!", "dither")
@@ -187,13 +187,13 @@ class InTheWay(ProgramTest):
                 self.refuse(2, "is a folder; name a file in it", *arguments)
             (self.folder / target).rmdir()
 
-    def test_a_file_in_place_of_a_folder_is_told(self):
+    def test_a_file_in_place_of_a_folder_is_reported(self):
         (self.folder / "file").write_text("in the way")
         self.refuse(2, "'file' exists and is not a folder", "slice-export", "-i", "part.vdb", "file", "--overwrite")
         for arguments in self.sinks("file"):
             self.refuse(2, "there is no folder 'file'", *arguments)
 
-    def test_a_device_or_a_pipe_in_place_of_a_file_is_told(self):
+    def test_a_device_or_a_pipe_in_place_of_a_file_is_reported(self):
         os.mkfifo(self.folder / "out")
         self.refuse(2, "'/dev/full' is not an ordinary file", "read", "part.vdb", "!", "write", "/dev/full", "--overwrite")
         self.refuse(2, "'out' exists and is not a folder", "slice-export", "-i", "part.vdb", "out", "--overwrite")
@@ -205,7 +205,7 @@ class InTheWay(ProgramTest):
 
 
 class Killed(ProgramTest):
-    """kill -9 in the middle of any output leaves the old one whole, and the next run cleans up."""
+    """kill -9 during any output leaves the old output complete, and the next run cleans up."""
 
     def setUp(self):
         super().setUp()

@@ -1,4 +1,4 @@
-"""Intermediate files are what other tools of OpenVDB take them for."""
+"""Other programs read intermediate files correctly."""
 
 import json
 import math
@@ -15,7 +15,7 @@ PITCH_MM = (0.042, 0.084, 0.022)
 
 
 class Files(ProgramTest):
-    """Every stage of a sphere at a place of its own, in one file."""
+    """Reads one file that contains every stage of a sphere away from the origin."""
 
     def setUp(self):
         super().setUp()

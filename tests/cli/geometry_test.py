@@ -1,4 +1,4 @@
-"""What resample, offset, csg and hollow make goes on to the slices, however it is run."""
+"""Chains with resample, offset, csg and hollow give correct slices in every way to run them."""
 
 import json
 import shutil
@@ -14,7 +14,7 @@ SLICES = "dither --mask white ! material-assign ! slice-export out --overwrite"
 
 class Geometry(ProgramTest):
     def voxels(self, chain):
-        """How many voxels the slices of a chain have."""
+        """Returns the number of voxels in the slices of a chain."""
         self.shell(f"vdbdither {chain} ! {SLICES}")
         manifest = stack.check(self.folder / "out")
         return sum(material["voxels"] for material in manifest["materials"])
@@ -75,13 +75,13 @@ class Geometry(ProgramTest):
         part = "mesh2sdf part.stl --printer mimaki-3duj-553"
         self.assert_volume(f"{part} ! csg --difference hole.vdb", 8 - 2)
         of_file = stack.sums(self.folder / "out")
-        # The part does not reach all of it, which is no fault of its writer.
+        # The part needs only some of its layers; the writer must succeed.
         self.shell("mkfifo hole.fifo; mesh2sdf hole.stl --printer mimaki-3duj-553 > hole.fifo & "
                    f"vdbdither {part} ! csg --difference hole.fifo ! {SLICES} && wait $!")
         self.assertEqual(stack.sums(self.folder / "out"), of_file)
 
     def test_one_writer_may_feed_both_operands_of_which_only_some_layers_are_wanted(self):
-        # No slab is larger than what the pipes and `cat` hold.
+        # Each slab fits into the buffers of the pipes and of `cat`.
         self.box("part.stl", (1, 1, 8))
         self.shell("mkfifo second.fifo; mesh2sdf part.stl --printer mimaki-3duj-553 --slab 8 | tee >(cat > second.fifo) | "
                    f"csg --intersection second.fifo ! {SLICES} --slab 8 --layers 20:30")
@@ -109,7 +109,7 @@ class Geometry(ProgramTest):
         self.assertGreater(count, 1000)
         self.assertLess(worst, 0.1 * 0.022)
 
-    def test_a_level_set_that_is_piped_in_goes_on_to_slices(self):
+    def test_a_piped_level_set_gives_slices(self):
         meshes.write_stl(self.folder / "part.stl", meshes.turned(meshes.box((1, 1.5, 1.2)), 20, 30))
         self.succeed("mesh2sdf", "part.stl", "--pitch", "0.05,0.05,0.05", "-o", "cubes.vdb")
         resampled = "resample - --printer mimaki-3duj-553 ! normals"
@@ -117,7 +117,7 @@ class Geometry(ProgramTest):
         for slab, threads in (("8", 1), ("all", 2)):
             self.shell(f"cat cubes.vdb | vdbdither {resampled} ! {SLICES} --slab {slab} --threads {threads}")
             sums.append(stack.sums(self.folder / "out"))
-        # As it comes from another operator, in slabs.
+        # From another operator, in slabs.
         self.shell("mesh2sdf part.stl --pitch 0.05,0.05,0.05 --slab 8 | "
                    f"vdbdither {resampled} ! {SLICES} --slab 8")
         sums.append(stack.sums(self.folder / "out"))

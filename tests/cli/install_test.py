@@ -1,4 +1,4 @@
-"""What `cmake --install` puts under a prefix works from there."""
+"""Files installed by `cmake --install` work from their prefix."""
 
 import subprocess
 import unittest
@@ -56,7 +56,7 @@ class Install(ProgramTest):
         self.succeed("-i", "b.vdb", "again", program=links / "slice-export")
         self.assertEqual(stack.sums(self.folder / "again"), stack.sums(self.folder / "out"))
 
-    def test_manual_pages_and_completion_lie_where_shells_look(self):
+    def test_manual_pages_and_completion_are_where_shells_look(self):
         share = self.prefix / "share"
         pages = {page.name for page in (share / "man/man1").iterdir()}
         self.assertLessEqual({"vdbdither.1", "vdbdither-slice-export.1", "vdbdither-printers.1"}, pages)

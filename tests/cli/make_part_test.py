@@ -1,4 +1,4 @@
-"""The sample part is the solid that its description says."""
+"""The sample part agrees with its description."""
 
 import pathlib
 import struct
@@ -25,10 +25,10 @@ class MakePart(unittest.TestCase):
         cls.triangles = [(row[3:6], row[6:9], row[9:12])
                          for row in struct.iter_unpack("<12fH", cls.stl[84:])]
 
-    def test_comes_out_the_same_bytes_every_time(self):
+    def test_has_the_same_bytes_every_time(self):
         self.assertEqual(self.stl, make_part())
 
-    def test_announces_as_many_triangles_as_it_holds(self):
+    def test_states_its_number_of_triangles(self):
         self.assertEqual(struct.unpack("<I", self.stl[80:84])[0], len(self.triangles))
 
     def test_is_closed_manifold_and_consistently_oriented(self):

@@ -1,5 +1,5 @@
-"""Mesh files that are not what they should be, through the whole chain: slices, with a warning where something had to be
-mended, or a refusal in one line; in little time and memory."""
+"""Malformed mesh files through the whole chain give slices, with a warning after a repair, or a refusal in one line, in limited
+time and memory."""
 
 import json
 import math
@@ -17,7 +17,7 @@ from program import MIMAKI, PATIENCE, ProgramTest
 CHAIN = ("--fit", "2", "--threads", "2", "!", "dither", "!", "slice-export", "out", "--overwrite", "--quiet")
 BOX = meshes.box((2, 2, 2))
 
-# On any machine, however slow or loaded; what hangs takes longer. What takes memory for what a header says takes more.
+# Limits for slow and loaded machines. A run that hangs, or that trusts the sizes in a header, exceeds them.
 SECONDS = 10
 BYTES = 2 << 30
 
@@ -64,7 +64,7 @@ def binary_ply(triangles, list_length=3, index=0):
 
 
 def spoilt(value):
-    """The box with a coordinate that is no number."""
+    """Returns the box with `value` as one coordinate."""
     (a, b, c), *rest = BOX
     return [((value, *a[1:]), b, c), *rest]
 
@@ -72,7 +72,7 @@ def spoilt(value):
 WHOLE_STL, WHOLE_TEXT, WHOLE_OBJ, WHOLE_PLY = binary_stl(BOX), ascii_stl(BOX), obj(BOX), ply(BOX)
 NAN, INF = math.nan, math.inf
 
-# Files that hold the whole box; whether something is said of them.
+# Files that contain the whole box, and whether they cause a warning.
 MENDED = {
     "windows.stl": (ascii_stl(BOX, "\r\n"), False),
     "old-mac.obj": (obj(BOX, end="\r"), False),
@@ -97,7 +97,7 @@ MENDED = {
     "flat-face.stl": (binary_stl([*BOX, (BOX[0][0],) * 3]), True),
 }
 
-# Files of which nothing can be made.
+# Files that must be refused.
 REFUSED = {
     "empty.stl": b"", "empty.obj": b"", "empty.ply": b"", "blank.obj": b"\n\n \n",
     "header-only.stl": WHOLE_STL[:84], "half-header.stl": WHOLE_STL[:40], "no-triangles.stl": binary_stl([]),
@@ -125,11 +125,11 @@ REFUSED = {
 class Malformed(ProgramTest):
     def limit(self):
         if not os.environ.get("VDBDITHER_SANITIZER"):
-            # A sanitizer's shadow takes terabytes of addresses.
+            # The shadow memory of a sanitizer needs terabytes of addresses.
             resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
 
     def outcome(self, mesh):
-        """What was said in a run that ended well, or None after one that was refused as it should be."""
+        """Returns standard error of a successful run, or None after a valid refusal."""
         before = self.listing()
         done = self.run_program("mesh2sdf", mesh, *MIMAKI, *CHAIN, timeout=SECONDS * PATIENCE,
                                 preexec_fn=self.limit)
@@ -148,7 +148,7 @@ class Malformed(ProgramTest):
         self.assertEqual(self.listing(), before)
         return None
 
-    def test_what_can_be_mended_gives_the_slices_of_the_whole_part(self):
+    def test_repairable_files_give_the_slices_of_the_whole_part(self):
         (self.folder / "whole.stl").write_bytes(WHOLE_STL)
         self.assertEqual(self.outcome("whole.stl"), "")
         whole = stack.sums(self.folder / "out")
@@ -160,13 +160,13 @@ class Malformed(ProgramTest):
                 self.assertEqual(said != "", told, said)
                 self.assertEqual(stack.sums(self.folder / "out"), whole)
 
-    def test_what_cannot_be_mended_is_refused(self):
+    def test_unrepairable_files_are_refused(self):
         for name, content in REFUSED.items():
             with self.subTest(name=name):
                 (self.folder / name).write_bytes(content)
                 self.assertIsNone(self.outcome(name))
 
-    def test_a_file_cut_anywhere_is_mended_or_refused(self):
+    def test_a_file_cut_anywhere_is_repaired_or_refused(self):
         for kind, content in (("stl", WHOLE_STL), ("text.stl", WHOLE_TEXT), ("obj", WHOLE_OBJ), ("ply", WHOLE_PLY),
                               ("binary.ply", binary_ply(BOX))):
             for part in range(1, 8):
@@ -174,8 +174,8 @@ class Malformed(ProgramTest):
                 with self.subTest(kind=kind, part=part):
                     self.outcome(f"cut.{kind}")
 
-    def test_a_part_of_which_nothing_is_left_is_told(self):
-        # One corner is so far away that the rest has no size.
+    def test_an_empty_part_is_reported(self):
+        # One corner is so far away that the other corners coincide.
         (self.folder / "far.stl").write_bytes(binary_stl(spoilt(3e38)))
         self.assertIn("warning: no voxel is printed; ", self.outcome("far.stl"))
 
@@ -185,7 +185,7 @@ class Malformed(ProgramTest):
         self.refuse(1, "is not read yet; export OBJ,", "mesh2sdf", "part.3mf", *MIMAKI, *CHAIN)
 
     @unittest.skipUnless("VDBDITHER_MODELS" in os.environ, "VDBDITHER_MODELS names no folder of models")
-    def test_every_malformed_model_is_mended_or_refused(self):
+    def test_every_malformed_model_is_repaired_or_refused(self):
         models = sorted((pathlib.Path(os.environ["VDBDITHER_MODELS"]) / "malformed").iterdir())
         self.assertGreater(len(models), 0)
         for model in models:

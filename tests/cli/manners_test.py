@@ -1,4 +1,4 @@
-"""What a new user meets: odd parts, full disks, and files that are to be small."""
+"""Help for new users: unusual parts, full disks, estimates, and small files."""
 
 import json
 import re
@@ -28,12 +28,12 @@ class Manners(ProgramTest):
                          "the printer builds; turn it with --rotate, or see --unit and --fit\n")
         self.assertEqual(self.sized((200, 20, 20)), "")
 
-    def test_a_folder_of_meshes_is_told_how_to_be_given(self):
+    def test_a_folder_of_meshes_is_refused_with_advice(self):
         (self.folder / "parts").mkdir()
         meshes.write_stl(self.folder / "parts/a.stl", meshes.sphere(0.6))
         self.refuse(1, "'parts': a folder; name the meshes in it, as in parts/*.stl", "mesh2sdf", "parts", *MIMAKI, "-o", "x.vdb")
 
-    def test_explain_tells_what_the_disk_needs(self):
+    def test_explain_reports_the_disk_space(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(6, 60))
         for arguments, output in (("-o x.vdb", "x.vdb"), ("! dither ! slice-export out", "out")):
             said = self.succeed("run", f"mesh2sdf part.stl --printer mimaki-3duj-553 {arguments} --explain").decode()
@@ -47,11 +47,11 @@ class Manners(ProgramTest):
             self.assertTrue(0.4 < expected / used < 2.5, (used, said))
 
     def explained(self, chain):
-        """What --explain says about memory, time and disk."""
+        """Returns what --explain reports about memory, time and disk."""
         said = self.succeed("run", f"{chain} --explain").decode()
         return dict(re.findall(r"(?m)^(memory|time|disk) +(.*)$", said))
 
-    def test_explain_tells_time_and_disk_behind_every_source_that_knows_its_size(self):
+    def test_explain_reports_time_and_disk_after_every_source_with_a_known_size(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
         self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 ! write surface.vdb ! dither ! write solid.vdb "
                             "! slice-export stack")
@@ -64,7 +64,7 @@ class Manners(ProgramTest):
                 self.assertRegex(told["disk"], r"^about \d[\d.]* (KiB|MiB) of ")
                 self.assertRegex(told["time"], r"^about \d+\.\d s on \d+ threads?$")
 
-    def test_disk_behind_a_file_or_a_stack_is_told_within_a_factor(self):
+    def test_disk_after_a_file_or_a_stack_is_estimated_within_a_factor(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(6, 60))
         self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! write job.vdb ! slice-export stack")
         for chain in ("read job.vdb", "slice-import stack", "resample job.vdb --printer mimaki-3duj-553"):
@@ -74,7 +74,7 @@ class Manners(ProgramTest):
                 used = (self.folder / "x.vdb").stat().st_size
                 self.assertTrue(0.3 < float(expected) * {"KiB": 2**10, "MiB": 2**20}[unit] / used < 3, (expected, unit, used))
 
-    def test_explain_says_what_it_does_not_know(self):
+    def test_explain_reports_unknown_costs(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
         self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 -o surface.vdb")
         piped = self.succeed("read", "surface.vdb")
@@ -83,12 +83,12 @@ class Manners(ProgramTest):
         self.assertRegex(said, r"(?m)^disk +unknown of .* for x\.vdb$")
 
     def seconds(self, chain):
-        """The time that --explain promises on one thread."""
+        """Returns the time that --explain expects on one thread."""
         said = self.explained(chain)["time"]
         number, unit = re.fullmatch(r"about ([\d.]+) (s|min|h) on 1 thread", said).groups()
         return float(number) * {"s": 1, "min": 60, "h": 3600}[unit]
 
-    def test_what_is_asked_for_costs_its_time(self):
+    def test_more_work_has_a_longer_expected_time(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
         source = "mesh2sdf part.stl --printer mimaki-3duj-553 --threads 1"
         for little, much, least, most in (
@@ -104,7 +104,7 @@ class Manners(ProgramTest):
                 ratio = self.seconds(f"{little} {much}") / self.seconds(little)
                 self.assertTrue(least < ratio < most, ratio)
 
-    def test_disk_of_a_mesh_or_a_mask_is_told_within_a_factor(self):
+    def test_disk_of_a_mesh_or_a_mask_is_estimated_within_a_factor(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(4, 60))
         solid = "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither"
         for chain, output in ((f"{solid} ! mesh-export x.stl", "x.stl"), (f"{solid} ! mesh-export x.ply", "x.ply"),
@@ -116,7 +116,7 @@ class Manners(ProgramTest):
                 used = (self.folder / output).stat().st_size
                 self.assertTrue(0.5 < float(expected) * {"KiB": 2**10, "MiB": 2**20}[unit] / used < 2, (expected, unit, used))
 
-    def test_json_tells_what_was_expected_beside_what_came(self):
+    def test_json_reports_expected_and_measured_time(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
         told = json.loads(self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! slice-export out "
                                               "--threads 1 --json"))
@@ -126,7 +126,7 @@ class Manners(ProgramTest):
         for stage, whole in zip(half["stages"], told["stages"]):
             self.assertLess(stage["expected_cpu_seconds"], whole["expected_cpu_seconds"], stage["name"])
 
-    def test_who_works_at_the_surface_is_expected_to_take_no_longer_behind_a_wide_band(self):
+    def test_work_at_the_surface_has_no_longer_expected_time_after_a_wide_band(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
         expected = {}
         for band in (1, 8):
@@ -136,11 +136,11 @@ class Manners(ProgramTest):
                 expected[stage["name"], band] = stage["expected_cpu_seconds"]
         for name in ("stats", "dither"):
             self.assertAlmostEqual(expected[name, 8] / expected[name, 1], 1, delta=0.1, msg=name)
-        # Its layers are more, each of which costs something.
+        # It has more layers, and each layer costs time.
         self.assertLess(expected["slice-export", 8], 1.5 * expected["slice-export", 1])
         self.assertGreater(expected["mesh2sdf", 8], 2 * expected["mesh2sdf", 1])
 
-    def test_a_name_of_another_format_is_not_given_to_a_vdb(self):
+    def test_a_vdb_cannot_have_the_ending_of_another_format(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
         self.refuse(2, "write: 'x.stl' is a mesh by its name, and this is a .vdb; mesh-export writes meshes",
                     "mesh2sdf", "part.stl", *MIMAKI, "-o", "x.stl")
@@ -148,7 +148,7 @@ class Manners(ProgramTest):
         self.refuse(1, "'part.stl' is not a readable VDB archive: it is a file of another kind; meshes come in by mesh2sdf",
                     "dither", "-i", "part.stl", "-o", "x.vdb")
 
-    def test_what_is_forgotten_is_named(self):
+    def test_a_missing_argument_is_named(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
         self.refuse(2, "slice-export: 'folder' is missing; see --help", "mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!",
                     "slice-export")
@@ -169,7 +169,7 @@ class Manners(ProgramTest):
         self.assertEqual(self.shell("vdbdither | cat"), self.succeed("--help"))
         self.refuse(2, "run: the chain is empty", "run", " ")
 
-    def test_what_does_not_fit_on_the_disk_is_refused_before_the_run(self):
+    def test_an_output_larger_than_the_disk_is_refused_before_the_run(self):
         disk = self.folder / "disk"
         disk.mkdir()
         mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], capture_output=True)
@@ -179,7 +179,7 @@ class Manners(ProgramTest):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(6))
         self.refuse(1, "write: 'disk/x.vdb' needs about ", "mesh2sdf", "part.stl", *MIMAKI, "-o", "disk/x.vdb")
 
-    def test_half_floats_are_small_and_taken_up_again(self):
+    def test_files_of_16_bit_values_are_small_and_read_again(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(1.5))
         self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 ! normals ! write whole.vdb ! write half.vdb --half")
         sizes = [(self.folder / name).stat().st_size for name in ("half.vdb", "whole.vdb")]
@@ -187,12 +187,12 @@ class Manners(ProgramTest):
         whole, half = [json.loads(self.succeed("info", name, "--json")) for name in ("whole.vdb", "half.vdb")]
         self.assertEqual([grid["active_voxels"] for grid in whole["grids"]], [grid["active_voxels"] for grid in half["grids"]])
         self.succeed("run", "read half.vdb ! dither ! slice-export out")
-        # What was read from half floats is written in full again.
+        # A file read from 16-bit values is written with 32 bits again.
         self.succeed("run", "read half.vdb ! write again.vdb")
         self.assertGreater((self.folder / "again.vdb").stat().st_size, sizes[0])
         self.succeed("compare", "half.vdb", "again.vdb")
 
-    def test_a_stack_of_some_layers_says_which_it_can_give(self):
+    def test_a_stack_of_some_layers_names_the_layers_it_has(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
         self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! slice-export some --layers 20:60")
         said = self.refuse(1, "'some' lacks layer 0; --layers ", "slice-import", "some", "-o", "x.vdb").stderr.decode()

@@ -1,4 +1,4 @@
-"""Manuals and completion, which are made from what operators declare."""
+"""Manuals and completion, which are made from the declarations of operators."""
 
 import shutil
 import subprocess
@@ -41,7 +41,7 @@ class Manual(ProgramTest):
             self.assertEqual((done.returncode, done.stderr), (0, ""), page.name)
 
     def completed(self, *words):
-        """What bash offers for the last of these words."""
+        """Returns the completions of bash for the last of these words."""
         self.succeed("docs", "completion", "share")
         script = self.folder / "share/bash-completion/completions/vdbdither"
         line = f"source {script}; COMP_WORDS=(\"$@\"); COMP_CWORD=$(($# - 1)); _vdbdither; printf '%s\\n' \"${{COMPREPLY[@]}}\""

@@ -1,4 +1,4 @@
-"""Masks that are made on the way are kept, whole or not at all, and found again."""
+"""Masks made by dither are kept, completely or not at all, and found again."""
 
 import os
 import signal
@@ -17,7 +17,7 @@ class Masks(ProgramTest):
         self.cache = self.folder / "cache/vdbdither/masks"
 
     def dithered(self, *arguments, warning=None, cache=None, **environment):
-        """The archive of the voxels, after one warning or none."""
+        """Returns the archive of the voxels. Checks for one warning, or for none."""
         environment = {**os.environ, "XDG_CACHE_HOME": cache or str(self.folder / "cache"), **environment}
         done = self.run_program("dither", "-i", "part.vdb", *arguments, env=environment)
         said = done.stderr.decode()
@@ -46,7 +46,7 @@ class Masks(ProgramTest):
         after = mask.stat()
         self.assertEqual((after.st_ino, after.st_mtime_ns), (before.st_ino, before.st_mtime_ns))
 
-    def test_every_setting_has_a_mask_of_its_own(self):
+    def test_every_setting_has_its_own_mask(self):
         for count, arguments in enumerate((("--size", 8), ("--size", 8, "--sigma", 1.5), ("--size", 8, "--seed", 2),
                                            ("--size", 12), ("--size", 8, "--sigma", 1.50000001)), 1):
             self.dithered(*arguments)
@@ -86,7 +86,7 @@ class Masks(ProgramTest):
         self.succeed("mask", "--size", 16, "--sigma", 2, "-o", mask, "--overwrite")
         self.assertEqual(self.dithered("--size", 16, warning="holds another mask than its name says; it is made again"), first)
 
-    def test_without_a_cache_the_mask_is_made_all_the_same(self):
+    def test_without_a_cache_the_mask_is_still_made(self):
         first = self.dithered("--size", 16)
         (self.folder / "file").write_text("in the way")
         self.assertEqual(self.dithered("--size", 16, cache=str(self.folder / "file"),
@@ -95,11 +95,11 @@ class Masks(ProgramTest):
                                        warning="made anew in every run: neither XDG_CACHE_HOME nor HOME names a folder"), first)
         self.assertFalse((self.folder / "relative").exists())
 
-    def test_without_a_cache_folder_of_its_own_home_holds_one(self):
+    def test_without_a_cache_folder_the_home_folder_has_one(self):
         self.dithered("--size", 8, cache="relative", HOME=str(self.folder / "home"))
         self.assertEqual(len(list((self.folder / "home/.cache/vdbdither/masks").iterdir())), 1)
 
-    def test_what_is_stopped_leaves_nothing(self):
+    def test_an_interrupted_run_leaves_no_mask(self):
         environment = {**os.environ, "XDG_CACHE_HOME": str(self.folder / "cache")}
         for arguments in (("dither", "-i", "part.vdb", "--size", 192, "-o", "x.vdb"), ("mask", "--size", 192, "-o", "x.vdb")):
             before = self.listing()

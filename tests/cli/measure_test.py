@@ -1,4 +1,4 @@
-"""measure and mesh-export from outside: alone, at the end of a chain, of a pipe."""
+"""measure and mesh-export: alone, at the end of a chain, and at the end of a pipe."""
 
 import json
 import unittest
@@ -49,7 +49,7 @@ class MeasureTest(ProgramTest):
             self.assertEqual((self.folder / f"fused.{kind}").read_bytes(), (self.folder / f"piped.{kind}").read_bytes())
 
     def test_dithering_leaves_less_of_the_steps_than_plain_voxels_after_the_print(self):
-        # Large enough that its edges, which the print rounds, count for little.
+        # The part is large; its edges, which the print rounds, hardly count.
         meshes.write_stl(self.folder / "large.stl", meshes.turned(meshes.box((5, 5, 5)), 2, 3))
         staircase = {}
         for mask in ("none", "white"):

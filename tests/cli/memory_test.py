@@ -1,4 +1,4 @@
-"""Memory is a few slabs, whatever the height of the part."""
+"""The program needs the memory of a few slabs, for any height of the part."""
 
 import json
 import unittest
@@ -9,7 +9,7 @@ from program import MIMAKI, ProgramTest
 
 class Memory(ProgramTest):
     def peak(self, height_mm, *arguments):
-        """Bytes that the main chain takes at most for a cylinder."""
+        """Returns the peak memory in bytes of the main chain for a cylinder."""
         meshes.write_stl(self.folder / "part.stl", meshes.cylinder(5, height_mm))
         report = self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "normals", "!", "dither", "!", "material-assign", "!",
                               "slice-export", "out", "--overwrite", "--json", "--threads", "2", *arguments)

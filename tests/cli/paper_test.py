@@ -1,4 +1,4 @@
-"""The parts and methods of samples/paper: closed meshes, and chains that run."""
+"""Tests samples/paper: parts are closed meshes, and every method runs."""
 
 import importlib.util
 import struct
@@ -40,11 +40,11 @@ class Paper(ProgramTest):
                          "--overwrite", "-q")
             self.assertGreater((self.folder / "solid.vdb").stat().st_size, 0, name)
 
-    def test_a_step_that_is_none_is_told(self):
+    def test_an_unknown_step_is_refused(self):
         done = subprocess.run([PAPER / "reproduce.sh", "figure"], capture_output=True, text=True, cwd=self.folder,
                               env={"PATH": "/usr/bin:/bin", "WORK": str(self.folder), "RESULT": str(self.folder)}, timeout=60)
         self.assertEqual(done.returncode, 2)
-        self.assertEqual(done.stderr, "reproduce.sh: there is no step 'figure'; there are figure8 figure9 readings "
+        self.assertEqual(done.stderr, "reproduce.sh: unknown step 'figure'; use figure8 figure9 readings "
                          "pictures speed masks default\n")
 
 

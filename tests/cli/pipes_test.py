@@ -1,4 +1,4 @@
-"""What happens when a pipe, a file or the user lets the program down."""
+"""Damaged pipes and files, interrupted runs, and processes that end early."""
 
 import os
 import random
@@ -12,7 +12,7 @@ from program import MIMAKI, PATIENCE, ProgramTest
 
 
 class Damage(ProgramTest):
-    """Frames and files that were cut short or changed on their way."""
+    """Frames and files that are truncated or changed."""
 
     def setUp(self):
         super().setUp()
@@ -26,7 +26,7 @@ class Damage(ProgramTest):
 
     @staticmethod
     def beginnings(frames):
-        """Where the archives of a pipe begin."""
+        """Returns the positions at which the archives of a pipe begin."""
         magic, at, found = frames[:8], 0, []
         while at >= 0:
             found.append(at)
@@ -71,7 +71,7 @@ class Damage(ProgramTest):
             some = self.succeed("mesh2sdf", "part.stl", *MIMAKI, "--layers", layers)
             done = self.refuse(1, "standard input lacks layer", "normals", "-o", "out.vdb", input=some)
             self.assertIn(f"lacks layer {first};", done.stderr.decode())
-        # Enough for what is wanted and its neighbours is enough.
+        # The wanted layers and their neighbours are sufficient.
         some = self.succeed("mesh2sdf", "part.stl", *MIMAKI, "--layers", "0:32")
         self.succeed("normals", "--layers", "4:12", "-o", "out.vdb", input=some)
 
@@ -80,7 +80,7 @@ class Damage(ProgramTest):
         self.refuse(1, "'some.vdb' lacks layer 32;", "normals", "-i", "some.vdb", "-o", "out.vdb")
         self.succeed("normals", "-i", "some.vdb", "--layers", "4:12", "-o", "out.vdb")
 
-    def test_what_is_no_vdb_is_refused(self):
+    def test_data_other_than_vdb_is_refused(self):
         for text in (b"hello\n", bytes(5000), self.random.randbytes(5000)):
             self.refuse_frames(text)
 
@@ -96,7 +96,7 @@ class Damage(ProgramTest):
 
 
 class Stops(ProgramTest):
-    """Runs that end before their time leave nothing behind."""
+    """Runs that end early leave no files."""
 
     def setUp(self):
         super().setUp()
@@ -108,7 +108,7 @@ class Stops(ProgramTest):
         return ["mesh2sdf", "tall.stl", *MIMAKI, "--slab", "8", "!", "normals", "!", "dither", "!", "slice-export", "out"]
 
     def wait_for_slices(self, process):
-        """Waits until a stack is begun."""
+        """Waits until the first slice exists."""
         deadline = time.monotonic() + 60 * PATIENCE
         while not any(path.suffix == ".png" for path in self.folder.rglob("*")):
             self.assertIsNone(process.poll())
@@ -125,7 +125,7 @@ class Stops(ProgramTest):
             self.assertRegex(said, r"^vdbdither.*: stopped: \w+\n$")
             self.assertEqual(self.listing(), self.inputs)
 
-    def test_who_waits_for_a_pipe_can_be_stopped(self):
+    def test_a_process_that_waits_for_a_pipe_can_be_stopped(self):
         os.mkfifo(self.folder / "silent.vdb")
         self.succeed("mesh2sdf", "part.stl", *MIMAKI, "-o", "part.vdb")
         before = self.listing()
@@ -147,7 +147,7 @@ class Stops(ProgramTest):
                 self.assertEqual(self.listing(), before)
         os.close(reader)
 
-    def test_what_a_killed_run_left_is_cleared_by_the_next(self):
+    def test_files_of_a_killed_run_are_removed_by_the_next(self):
         process = self.start(*self.chain())
         self.wait_for_slices(process)
         process.kill()
@@ -166,7 +166,7 @@ class Stops(ProgramTest):
         self.assertRegex(said, r"^vdbdither read: standard input .*\n$")
         self.assertEqual(self.listing(), self.inputs)
 
-    def test_a_reader_that_leaves_is_an_error_and_no_crash(self):
+    def test_a_reader_that_closes_the_pipe_is_an_error(self):
         process = self.start("mesh2sdf", "tall.stl", *MIMAKI, "--slab", "8")
         self.assertEqual(len(process.stdout.read(1000)), 1000)
         process.stdout.close()
@@ -174,12 +174,12 @@ class Stops(ProgramTest):
         self.assertEqual(process.wait(), 1)
         self.assertEqual(said, "vdbdither write: the reader of the pipe has gone\n")
 
-    def test_a_full_disk_under_standard_output_is_told(self):
+    def test_a_full_disk_at_standard_output_is_reported(self):
         with open("/dev/full", "wb") as full:
             self.refuse(1, "No space left on device", "mesh2sdf", "part.stl", *MIMAKI, stdout=full)
             self.refuse(1, "No space left on device", "--help", stdout=full)
 
-    def test_an_output_is_replaced_only_when_the_new_one_is_whole(self):
+    def test_an_output_is_replaced_only_when_the_new_one_is_complete(self):
         self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "out")
         before = self.listing()
         process = self.start(*self.chain(), "--overwrite")
@@ -192,14 +192,14 @@ class Stops(ProgramTest):
 
 
 class Explained(ProgramTest):
-    """Runs that only say what they would do, at the end of a pipe."""
+    """--explain at the end of a pipe."""
 
     def setUp(self):
         super().setUp()
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(2, 60))
         self.source = "vdbdither mesh2sdf part.stl --printer mimaki-3duj-553"
 
-    def test_explain_behind_a_pipe_lets_its_writer_end_well(self):
+    def test_explain_after_a_pipe_lets_its_writer_succeed(self):
         self.succeed("mesh2sdf", "part.stl", *MIMAKI, "-o", "part.vdb")
         before = self.listing()
         for reader in ("dither ! slice-export out", "dither --layers 0:8 -o x.vdb", "compare part.vdb",
@@ -209,7 +209,7 @@ class Explained(ProgramTest):
                 self.assertIn(b'"memory_bytes":', self.shell(f"{self.source} | vdbdither read --json ! {reader} --explain"))
                 self.assertEqual(self.listing(), before)
 
-    def test_explain_says_what_it_knows_before_its_writer_is_done(self):
+    def test_explain_prints_before_its_writer_is_done(self):
         frames = self.succeed("mesh2sdf", "part.stl", *MIMAKI)
         process = self.start("dither", "-o", "x.vdb", "--explain", stdin=subprocess.PIPE)
         process.stdin.write(frames[:-1])

@@ -1,4 +1,4 @@
-"""The command printers."""
+"""Tests the tool printers."""
 
 import unittest
 
@@ -13,18 +13,18 @@ class Printers(ProgramTest):
         for profile in (ROOT / "samples/printers").iterdir():
             self.assertRegex(said, rf"(?m)^{profile.stem} +[\d.]+ x [\d.]+ x [\d.]+ mm  \S")
 
-    def test_show_tells_a_profile(self):
+    def test_show_prints_a_profile(self):
         said = self.succeed("printers", "show", "mimaki-3duj-553").decode()
         for line in ("name      mimaki-3duj-553", "pitch     0.042 x 0.084 x 0.022 mm", "build     508 x 508 x 305 mm",
                      "materials white 240,240,240,255"):
             self.assertIn(line + "\n", said)
         self.refuse(2, "no printer 'mimaki'; there are mimaki-3duj-553 ", "printers", "show", "mimaki")
 
-    def test_every_sample_profile_is_proper(self):
+    def test_every_sample_profile_is_valid(self):
         for profile in (ROOT / "samples/printers").iterdir():
             self.assertIn("is a proper profile", self.succeed("printers", "check", profile).decode())
 
-    def test_check_tells_everything_that_is_wrong(self):
+    def test_check_lists_every_problem(self):
         (self.folder / "odd.json").write_text("""{"name": "even", "pitch_mm": ["42um", 0, "22um"], "bild_mm": [1, 2, 3],
             "materials": [{"name": "white", "rgba": [1, 2, 3, 300]}, {"name": "white", "rgba": [1, 2, 3, 4]}]}""")
         done = self.run_program("printers", "check", "odd.json")

@@ -1,4 +1,4 @@
-"""The page of samples/report.py."""
+"""Tests the page of samples/report.py."""
 
 import html.parser
 import importlib.util
@@ -11,7 +11,7 @@ from program import MIMAKI, ROOT, ProgramTest
 
 
 class Addresses(html.parser.HTMLParser):
-    """Every address on a page, and its tables as rows of text."""
+    """Collects the addresses on a page, and its tables as rows of text."""
 
     def __init__(self, text):
         super().__init__()
@@ -34,7 +34,7 @@ class Report(ProgramTest):
         return subprocess.run(["/usr/bin/python3", ROOT / "samples/report.py", *arguments], cwd=self.folder,
                               capture_output=True, text=True, timeout=120)
 
-    def test_a_page_holds_all_that_was_measured_and_needs_no_other_file(self):
+    def test_a_page_contains_all_measurements_and_needs_no_other_file(self):
         meshes.write_stl(self.folder / "part.stl", meshes.box((2, 2, 1)))
         self.succeed("render", "part.stl", "part.png", "-q")
         (self.folder / "run").mkdir()
@@ -55,16 +55,16 @@ class Report(ProgramTest):
         for number in page.rows[1][1:9]:
             self.assertTrue(re.fullmatch(r"-?[\d.]+(e[-+]\d+)?", number), number)
 
-    def test_what_cannot_be_laid_out_is_told(self):
+    def test_unknown_files_are_refused(self):
         self.assertIn("usage: ", self.report("page.html").stderr)
         self.assertEqual(self.report("page.html", "none").stderr, "report: no such file or folder 'none'\n")
         (self.folder / "odd.json").write_text("[1]")
         done = self.report("page.html", "odd.json")
         self.assertEqual(done.returncode, 1)
-        self.assertIn("'odd.json' is left out: neither of measure --report nor of ssim --json", done.stderr)
-        self.assertIn("there is nothing to lay out", done.stderr)
+        self.assertIn("'odd.json' is skipped: not from measure --report or ssim --json", done.stderr)
+        self.assertIn("nothing to show", done.stderr)
         (self.folder / "broken.json").write_text("{")
-        self.assertIn("'broken.json' is no JSON", self.report("page.html", "broken.json").stderr)
+        self.assertIn("'broken.json' is not valid JSON", self.report("page.html", "broken.json").stderr)
         self.assertFalse((self.folder / "page.html").exists())
 
 

@@ -1,4 +1,4 @@
-"""mesh-export's smoothing is that of MeshLab. Skipped where its server is not installed (Debian: meshlab, xvfb)."""
+"""mesh-export smooths like MeshLab. Skipped if meshlabserver is not installed (Debian: meshlab, xvfb)."""
 
 import shutil
 import struct
@@ -15,7 +15,7 @@ FILTER = """<!DOCTYPE FilterScript><FilterScript><filter name="Taubin Smooth">
 
 
 def ply_vertices(path):
-    """The positions of a binary PLY whose vertices begin with three floats."""
+    """Returns the positions of a binary PLY whose vertices begin with three floats."""
     data = path.read_bytes()
     header, body = data.split(b"end_header\n", 1)
     lines = header.decode().splitlines()
@@ -51,7 +51,7 @@ class Smoothing(ProgramTest):
             self.assertGreater(moved, 1e-3, "it smooths")
 
     def shell_quietly(self, line):
-        """A line of bash that may say what it likes."""
+        """Runs a line of bash and ignores its output."""
         self.shell(f"{line} >log 2>&1 || {{ cat log; false; }}")
 
 

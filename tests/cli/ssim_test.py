@@ -1,4 +1,4 @@
-"""The command ssim, and pictures of the whole program."""
+"""Tests the tool ssim, and pictures of the whole program."""
 
 import json
 import unittest
@@ -15,7 +15,7 @@ except ImportError:
 
 
 def over_grey(picture):
-    """Red, green and blue over a middle grey, and the cover; all 0 … 1."""
+    """Returns red, green and blue over a middle grey, and the coverage; all 0 … 1."""
     channels = numpy.asarray(picture.convert("RGBA")).astype(float) / 255
     cover = channels[..., 3:]
     return channels[..., :3] * cover + (1 - cover) * 0.5, cover[..., 0]
@@ -52,7 +52,7 @@ class Ssim(ProgramTest):
             drawn = numpy.asarray(Image.open(self.folder / f"maps-{a}/ssim.png").convert("L")) / 255
             self.assertLess(abs(drawn - numpy.clip(expected, 0, 1)).max(), 0.5001 / 255)
 
-    def test_the_eye_forgives_what_it_cannot_see(self):
+    def test_invisible_differences_do_not_count_for_the_eye(self):
         board = (numpy.indices((60, 60)).sum(axis=0) % 2 * 80 + 90).astype(numpy.uint8)
         Image.fromarray(board).save(self.folder / "fine.png")
         Image.fromarray(numpy.full((60, 60), 130, dtype=numpy.uint8)).save(self.folder / "plain.png")
@@ -64,13 +64,13 @@ class Ssim(ProgramTest):
         self.assertLess(far["flip"], near["flip"])
         self.assertAlmostEqual(far["pixels_per_degree"], 99.96, places=2)
 
-    def test_the_same_picture_is_wholly_alike(self):
+    def test_equal_pictures_have_perfect_scores(self):
         self.random_picture("a.png", 3)
         said = self.succeed("ssim", "a.png", "a.png").decode()
         self.assertRegex(said, r"^ssim +1\.000000\nssim seen +1\.000000  at 100\.0 pixels per degree\nflip +0\.000000\n"
                                r"pixels +600 of 1200\n$")
 
-    def test_what_is_transparent_is_no_part_of_the_object(self):
+    def test_transparent_pixels_are_not_part_of_the_object(self):
         self.random_picture("a.png", 4)
         for name, noise in (("one.png", 5), ("two.png", 6)):
             picture = Image.open(self.folder / "a.png").convert("RGBA")
@@ -82,7 +82,7 @@ class Ssim(ProgramTest):
         self.assertEqual((said["pixels"], said["flip"]), (600, 0))
         self.assertAlmostEqual(said["ssim"], 1, places=12)
 
-    def test_what_cannot_be_compared_is_refused(self):
+    def test_pictures_that_cannot_be_compared_are_refused(self):
         self.random_picture("a.png", 1)
         self.random_picture("wide.png", 1, (50, 30))
         self.random_picture("tiny.png", 1, (10, 10))

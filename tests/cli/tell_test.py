@@ -1,4 +1,4 @@
-"""What info, compare and stats tell of files and pipes."""
+"""Reports of info, compare and stats about files and pipes."""
 
 import json
 import math
@@ -19,7 +19,7 @@ class Tell(ProgramTest):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(RADIUS_MM, rings=60))
         self.succeed("run", f"{CHAIN} -o part.vdb")
 
-    def test_info_tells_the_same_of_a_file_a_pipe_and_a_chain(self):
+    def test_info_reports_the_same_for_a_file_a_pipe_and_a_chain(self):
         told = self.succeed("info", "part.vdb").decode()
         self.assertEqual(told, self.succeed("info", "-i", "part.vdb").decode())
         self.assertEqual(told, self.shell(f"vdbdither {CHAIN} | vdbdither info").decode())
@@ -29,7 +29,7 @@ class Tell(ProgramTest):
                         r"1 white: \d+ voxels", r"history +mesh2sdf part\.stl"):
             self.assertRegex(told, pattern)
 
-    def test_info_tells_it_as_json(self):
+    def test_info_reports_json(self):
         told = json.loads(self.succeed("info", "part.vdb", "--json"))
         self.assertEqual(told["lattice"]["pitch_mm"], [0.042, 0.084, 0.022])
         grids = {grid["name"]: grid for grid in told["grids"]}
@@ -40,7 +40,7 @@ class Tell(ProgramTest):
         self.assertEqual(grids["material"]["materials"][0]["voxels"], grids["solid"]["active_voxels"])
         self.assertEqual(len(told["history"]), 4)
 
-    def test_words_go_to_standard_error_where_voxels_go_to_standard_output(self):
+    def test_text_goes_to_standard_error_if_voxels_go_to_standard_output(self):
         done = self.run_program("run", f"{CHAIN} ! info ! write")
         self.assertEqual(done.returncode, 0)
         self.assertIn(b"surface   float", done.stderr)
@@ -69,7 +69,7 @@ class Tell(ProgramTest):
         self.refuse(1, "grid 'surface' in ", "compare", "whole.vdb", "half.vdb")
         self.assertEqual(self.succeed("compare", "whole.vdb", "half.vdb", "--tolerance", "0.0001"), b"equal\n")
 
-    def test_compare_tells_missing_grids_and_other_lattices(self):
+    def test_compare_reports_missing_grids_and_other_lattices(self):
         self.succeed("run", "read part.vdb --grids surface ! write one.vdb")
         self.refuse(1, "grid 'N' is missing there; ", "compare", "part.vdb", "one.vdb")
         self.refuse(1, "grid 'N' is there alone; ", "compare", "one.vdb", "part.vdb")
@@ -94,7 +94,7 @@ class Tell(ProgramTest):
         self.assertEqual(writer.wait(), 0)
 
     def foreign(self, name, grids):
-        """A .vdb of another tool: name, kind and transform of each grid."""
+        """Writes a .vdb of another program from name, kind and transform of each grid."""
         try:
             import pyopenvdb
         except ImportError:
@@ -120,7 +120,7 @@ class Tell(ProgramTest):
     def frustum(vdb):
         return vdb.createFrustumTransform((0, 0, 0), (9, 9, 9), 0.5, 1, 0.1)
 
-    def test_grids_of_other_lattices_are_no_hindrance_when_they_are_not_wanted(self):
+    def test_unwanted_grids_may_have_other_lattices(self):
         self.foreign("mixed.vdb", [("coarse", "FloatGrid", self.cubes(2.0)), ("fine", "FloatGrid", self.cubes(1.0))])
         self.refuse(1, "grids 'coarse' and 'fine' lie on different lattices", "read", "mixed.vdb", "!", "info")
         self.assertIn("fine      float: 1000 voxels", self.succeed("run", "read mixed.vdb --grids fine ! info").decode())
@@ -138,7 +138,7 @@ class Tell(ProgramTest):
         self.assertEqual(grids["fine"]["takers"], ["read mixed.vdb --grids fine"])
         self.assertEqual((grids["coarse"]["place"], grids["coarse"]["voxel_size"]), ("plain", [2, 2, 2]))
 
-    def test_info_describes_turned_grids_and_what_takes_them_does(self):
+    def test_info_describes_rotated_grids_and_resample_reads_them(self):
         self.foreign("turned.vdb", [("density", "FloatGrid", self.turned), ("v", "Vec3SGrid", self.turned)])
         told = self.succeed("info", "turned.vdb").decode()
         self.assertIn("          voxels of 0.1 x 0.1 x 0.2, turned, mirrored or sheared: x y z of index i j k are\n"
@@ -150,7 +150,7 @@ class Tell(ProgramTest):
         self.succeed("run", command.replace("NAME", "mimaki-3duj-553") + " --kind fog -o part.vdb --overwrite")
         self.refuse(1, "is turned or sheared; resample --grid ", "read", "turned.vdb", "!", "info")
 
-    def test_info_says_that_nothing_takes_a_frustum(self):
+    def test_info_reports_that_no_operator_reads_a_frustum(self):
         self.foreign("camera.vdb", [("density", "FloatGrid", self.frustum)])
         told = self.succeed("info", "camera.vdb").decode()
         self.assertRegex(told, r"^density   float: 1000 voxels from 0 0 0 to 9 9 9, .*\n"

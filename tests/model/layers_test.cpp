@@ -39,16 +39,16 @@ void expectSameVoxels(const FloatGrid& a, const FloatGrid& b, const CoordBBox& b
   }
 }
 
-FloatGrid::ConstPtr join(const std::vector<Layers>& pieces, ZRange wanted) {
+FloatGrid::ConstPtr join(const std::vector<GridLayers>& pieces, ZRange wanted) {
   return openvdb::gridConstPtrCast<FloatGrid>(joinLayers(pieces, wanted));
 }
 
 TEST(Layers, CutOutAndJoinedAgainAreTheVoxelsTheyWere) {
   const FloatGrid::ConstPtr whole = mixedGrid();
   const ZRange all{-128, 256};
-  std::vector<Layers> pieces;
+  std::vector<GridLayers> pieces;
   for (const ZRange part : {ZRange{-128, -16}, ZRange{-16, 8}, ZRange{8, 24}, ZRange{24, 256}}) {
-    const Layers source{whole, all};
+    const GridLayers source{whole, all};
     pieces.push_back({joinLayers({&source, 1}, part), part});
   }
   expectSameVoxels(*join(pieces, all), *whole, everything);
@@ -57,7 +57,7 @@ TEST(Layers, CutOutAndJoinedAgainAreTheVoxelsTheyWere) {
 
 TEST(Layers, NothingRemainsOutsideTheRange) {
   const FloatGrid::ConstPtr whole = mixedGrid();
-  const Layers source{whole, {-128, 256}};
+  const GridLayers source{whole, {-128, 256}};
   const FloatGrid::ConstPtr cut =
       openvdb::gridConstPtrCast<FloatGrid>(joinLayers({&source, 1}, {-13, 11}));
   for (auto at = everything.beginXYZ(); at; ++at) {
@@ -72,7 +72,7 @@ TEST(Layers, NothingRemainsOutsideTheRange) {
 
 TEST(Layers, APieceThatIsAllOfTheResultIsNotCopied) {
   const GridConstPtr whole = mixedGrid();
-  const Layers source{whole, {0, 8}};
+  const GridLayers source{whole, {0, 8}};
   EXPECT_EQ(joinLayers({&source, 1}, {0, 8}), whole);
   EXPECT_EQ(joinLayers({&source, 1}, {-8, 16}), whole);
 }
@@ -94,14 +94,14 @@ TEST(Layers, CarriesEveryGridTypeOfTheConventions) {
       openvdb::BoolGrid::create(false), openvdb::Int32Grid::create(0),
       openvdb::Vec3SGrid::create(openvdb::Vec3s(0.0F)), openvdb::DoubleGrid::create(1)};
   for (const GridConstPtr grid : grids) {
-    const std::vector<Layers> pieces{{grid, {0, 8}}, {grid, {8, 16}}};
+    const std::vector<GridLayers> pieces{{grid, {0, 8}}, {grid, {8, 16}}};
     EXPECT_EQ(joinLayers(pieces, {0, 16})->type(), grid->type());
   }
 }
 
 TEST(Layers, PointsAreRefused) {
   const GridConstPtr points = openvdb::points::PointDataGrid::create();
-  const std::vector<Layers> pieces{{points, {0, 8}}, {points, {8, 16}}};
+  const std::vector<GridLayers> pieces{{points, {0, 8}}, {points, {8, 16}}};
   EXPECT_THROW(joinLayers(pieces, {0, 16}), DataError);
 }
 

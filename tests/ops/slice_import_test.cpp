@@ -7,14 +7,14 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file/staged_output.h"
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 #include "io/profile/material_table.h"
 #include "io/vdb/vdb.h"
 #include "tests/support/drawn_grids.h"
-#include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/sinks.h"
 #include "tests/support/slabs.h"
+#include "tests/support/span_images.h"
 #include "tests/support/told.h"
 #include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
@@ -107,7 +107,7 @@ class SliceImport : public testing::Test {
     }
     const ZRange layers = schema.lattice.layers();
     for (const int height : {8, 64}) {
-      std::map<std::string, std::vector<Layers>> pieces;
+      std::map<std::string, std::vector<GridLayers>> pieces;
       for (int z = alignedToLeaves(layers).begin; z < layers.end; z += height) {
         const ZRange core = intersection({z, z + height}, layers);
         for (const auto& [grid_name, grid] : import.source().run(core))
@@ -165,7 +165,7 @@ TEST_F(SliceImport, AStackOfSolidHasNoMaterials) {
 
 TEST_F(SliceImport, WarnsOnceOfSlicesThatWereEdited) {
   exported(job(), {scratch_ / "out"});
-  const RunImage blank = test::runImage(182, 154, [](int, int) { return 0U; });
+  const SpanImage blank = test::spanImage(182, 154, [](int, int) { return 0U; });
   const std::vector<std::uint32_t> palette = {rgba(0, 0, 0)};
   for (const char* name : {"out/slice_00003.png", "out/slice_00004.png"})
     writeFile(scratch_ / name, encodePng(blank, {PngPixels::rgba8, palette, 0, 0}), name);
@@ -205,15 +205,15 @@ TEST_F(SliceImport, RefusesSlicesOfOtherSizesAndUnknownColours) {
     static_cast<void>(import.source().run(schema.lattice.layers()));
   };
   const std::vector<std::uint32_t> palette = {rgba(0, 0, 0), rgba(9, 8, 7)};
-  const auto replace = [&](const RunImage& image) {
+  const auto replace = [&](const SpanImage& image) {
     writeFile(scratch_ / "out/slice_00003.png", encodePng(image, {PngPixels::rgba8, palette, 0, 0}),
               "");
   };
-  replace(test::runImage(181, 154, [](int, int) { return 0U; }));
+  replace(test::spanImage(181, 154, [](int, int) { return 0U; }));
   EXPECT_THAT(whole, ThrowsMessage<DataError>(HasSubstr(
                          "out/slice_00003.png' of layer 3 has 181 x 154 pixels, not 182 x 154 as "
                          "the stack; make the stack again with slice-export")));
-  replace(test::runImage(182, 154, [](int x, int y) { return x == 17 && y == 4 ? 1U : 0U; }));
+  replace(test::spanImage(182, 154, [](int x, int y) { return x == 17 && y == 4 ? 1U : 0U; }));
   EXPECT_THAT(whole,
               ThrowsMessage<DataError>(HasSubstr(
                   "out/slice_00003.png' of layer 3 has the colour 9,8,7,255 in column 17 of row 4, "

@@ -13,11 +13,11 @@ namespace {
 
 using openvdb::CoordBBox;
 
-/// Two grids have the same digest where their voxels in `range`, values and states, are the same.
+/// Two grids have the same digest if their voxels in `range` have the same values and states.
 std::string digest(const GridConstPtr& grid, ZRange range) {
-  // A range of leaves never equals that of a whole grid, so the join copies, and cuts what is
+  // A range of leaves never equals that of a whole grid, so the join copies and removes the voxels
   // outside.
-  const std::vector<Layers> pieces{{grid, {range.begin - 4096, range.end + 4096}}};
+  const std::vector<GridLayers> pieces{{grid, {range.begin - 4096, range.end + 4096}}};
   return archiveBytes({{{"grid", pruned(joinLayers(pieces, range))}}, {}}, VdbCodec::mask);
 }
 

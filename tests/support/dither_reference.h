@@ -8,17 +8,17 @@
 
 namespace vdbdither::test {
 
-/// The equations of the paper once more, in double precision over dense arrays, as plainly as they
-/// can be written.
+/// A second implementation of the equations of the paper, in double precision over dense arrays,
+/// as simple as possible.
 
 /// V = { v : d(v) < 0 }.
 Voxels plainVoxels(const Volume<float>& d);
 
-/// ∂V: the voxels of V with a 6-neighbour outside V; what lies outside the box is outside V.
+/// ∂V: the voxels of V with a 6-neighbour outside V. Voxels outside the box are outside V.
 Voxels surfaceVoxels(const Voxels& V);
 
-/// (4): the voxel of ∂V closest to `v` in mm, ties to the smallest (k, j, i); none beyond
-/// `radius_mm`.
+/// (4): returns the voxel of ∂V closest to `v` in mm within `radius_mm`, if any. Ties go to the
+/// smallest (k, j, i).
 std::optional<openvdb::Coord> closestSurfaceVoxel(const std::vector<openvdb::Coord>& surface_voxels,
                                                   const openvdb::Coord& v,
                                                   const openvdb::Vec3d& pitch_mm, double radius_mm);

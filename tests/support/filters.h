@@ -10,17 +10,17 @@
 
 namespace vdbdither::test {
 
-/// The registered filter of that name with its options set.
+/// Returns the registered filter of that name with its options set.
 std::unique_ptr<Filter> filterCalled(const std::string& name,
                                      const std::vector<std::string>& arguments = {});
 
-/// A schema of these grids on a lattice.
+/// Returns a schema of these grids on a lattice.
 Schema schemaOf(const Lattice& lattice, Grids grids);
 
-/// `surface` of a ball around the origin, held as far as `band_mm`.
+/// Returns the schema of the grid `surface` of a ball around the origin with a band of `band_mm`.
 Schema ballWithBand(const Lattice& lattice, double radius_mm, double band_mm);
 
-/// Plans the filter of that name.
+/// Returns a function that plans the filter of that name.
 inline auto planning(const std::string& name, const Schema& schema,
                      const std::vector<std::string>& arguments) {
   return [=] { filterCalled(name, arguments)->plan(schema); };
@@ -35,8 +35,8 @@ Grids runWhole(Filter& filter, const Schema& schema);
 /// What it makes of slabs of `height` layers, each as `slabFor` gives it.
 std::vector<std::pair<ZRange, Grids>> runInSlabs(Filter& filter, const Schema& schema, int height);
 
-/// The grid `solid` of all those slabs over `box`. Fails the test where one holds voxels outside
-/// its core.
+/// Returns the grid `solid` of all those slabs over `box`. Fails the test if a slab has voxels
+/// outside its core.
 Voxels solidOfSlabs(Filter& filter, const Schema& schema, int height,
                     const openvdb::CoordBBox& box);
 

@@ -7,18 +7,18 @@
 
 namespace vdbdither::test {
 
-/// What keeps a mesh from being a closed, consistently oriented manifold, or nothing: every side of
-/// a triangle is met by exactly one other in the opposite direction, and the triangles at a vertex
+/// Returns why a mesh is not a closed, consistently oriented manifold, or an empty text. In such a
+/// mesh exactly one opposite side meets every side of a triangle, and the triangles at a vertex
 /// form one ring.
 std::string firstFlaw(const Mesh& mesh);
 
-/// How many sides are not met by as many in the opposite direction.
+/// Returns the number of sides without an opposite side.
 std::size_t openSides(const Mesh& mesh);
 
-/// Vertices − edges + faces: 2 for every sphere, 0 for every torus.
+/// Returns vertices − edges + faces: 2 for a sphere, 0 for a torus.
 int eulerCharacteristic(const Mesh& mesh);
 
-/// What the mesh encloses, mm³; positive where it faces outwards.
+/// Returns the enclosed volume, mm³; positive if the mesh faces outwards.
 double volumeOf(const Mesh& mesh);
 
 }  // namespace vdbdither::test

@@ -11,7 +11,7 @@ namespace vdbdither::test {
 
 namespace {
 
-/// The shortest text that reads back as the same number.
+/// Returns the shortest text that reads back as the same number.
 std::string digits(double value) {
   std::array<char, 32> buffer{};
   return {buffer.begin(), std::to_chars(buffer.begin(), buffer.end(), value).ptr};

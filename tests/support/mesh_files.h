@@ -7,7 +7,7 @@
 
 namespace vdbdither::test {
 
-/// The bytes of a mesh in each of the formats that are read. Normals are left at zero.
+/// Return the bytes of a mesh in each format that is read. Normals are zero.
 std::string binaryStl(const Mesh& mesh, std::string_view header = "binary STL");
 std::string asciiStl(const Mesh& mesh, std::string_view newline = "\n");
 std::string objText(const Mesh& mesh, std::string_view newline = "\n");

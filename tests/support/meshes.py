@@ -12,7 +12,7 @@ def box(size, corner=(0, 0, 0)):
 
 
 def lathe(profile, segments=48):
-    """The solid whose outline is the (radius, z) points of `profile`, from its bottom on the axis to its top."""
+    """Returns the solid of revolution of `profile`: (radius, z) points from its bottom on the axis to its top."""
     def point(ring, segment):
         radius, z = profile[ring]
         angle = 2 * math.pi * (segment % segments) / segments
@@ -42,7 +42,7 @@ def cylinder(radius, height):
 
 
 def turned(triangles, x_degrees, y_degrees):
-    """Turned about x, then about y."""
+    """Returns the triangles rotated about x, then about y."""
     def turn(point):
         x, y, z = point
         for degrees, axis in ((x_degrees, 0), (y_degrees, 1)):

@@ -1,4 +1,4 @@
-"""Runs the built program as a user does."""
+"""Runs the built program like a user."""
 
 import os
 import pathlib
@@ -9,14 +9,14 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = pathlib.Path(os.environ.get("VDBDITHER_PROGRAM", ROOT / "build/release/vdbdither")).resolve()
 
-# How much longer everything may take under a sanitizer.
+# Factor for time limits under a sanitizer.
 PATIENCE = 10 if os.environ.get("VDBDITHER_SANITIZER") else 1
 
 MIMAKI = ("--printer", "mimaki-3duj-553")
 
 
 class ProgramTest(unittest.TestCase):
-    """A test with an empty folder of its own, in which the program runs."""
+    """A test that runs the program in its own empty folder."""
 
     def setUp(self):
         holder = tempfile.TemporaryDirectory(prefix="vdbdither-test-")
@@ -24,7 +24,7 @@ class ProgramTest(unittest.TestCase):
         self.folder = pathlib.Path(holder.name)
 
     def environment(self):
-        """With the program and the links named like operators on the PATH."""
+        """Returns an environment with the program and the links of operators on the PATH."""
         return {**os.environ, "PATH": f"{PROGRAM.parent}:{PROGRAM.parent / 'operators'}:{os.environ['PATH']}"}
 
     def start(self, *arguments, **keywords):
@@ -35,27 +35,27 @@ class ProgramTest(unittest.TestCase):
         return process
 
     def run_program(self, *arguments, program=PROGRAM, **keywords):
-        """The finished process. Standard output and error are bytes."""
+        """Returns the finished process. Standard output and error are bytes."""
         keywords = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": 120 * PATIENCE, **keywords}
         if "input" not in keywords:
             keywords.setdefault("stdin", subprocess.DEVNULL)
         return subprocess.run([program, *map(str, arguments)], cwd=self.folder, **keywords)
 
     def succeed(self, *arguments, **keywords):
-        """Standard output of a run that ends well and says nothing."""
+        """Checks that a run succeeds without messages. Returns its standard output."""
         done = self.run_program(*arguments, **keywords)
         self.assertEqual((done.returncode, done.stderr), (0, b""), arguments)
         return done.stdout
 
     def shell(self, line):
-        """The same for a line of bash, in which every part of a pipe must end well."""
+        """Like `succeed`, for a line of bash; every process of a pipe must succeed."""
         done = subprocess.run(["bash", "-o", "pipefail", "-c", line], cwd=self.folder, env=self.environment(),
                               stdin=subprocess.DEVNULL, capture_output=True, timeout=120 * PATIENCE)
         self.assertEqual((done.returncode, done.stderr), (0, b""), line)
         return done.stdout
 
     def refuse(self, code, message, *arguments, **keywords):
-        """A run that ends with `code` and one line that holds `message`, and leaves the folder as it was."""
+        """Checks that a run exits with `code` and one line that contains `message`, and leaves the folder unchanged."""
         before = self.listing()
         done = self.run_program(*arguments, **keywords)
         said = done.stderr.decode()
@@ -68,5 +68,5 @@ class ProgramTest(unittest.TestCase):
         return done
 
     def listing(self):
-        """Everything in the folder with its size, hidden files too."""
+        """Returns all files in the folder with their sizes, including hidden files."""
         return sorted((str(path.relative_to(self.folder)), path.stat().st_size) for path in self.folder.rglob("*"))

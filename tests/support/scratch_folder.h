@@ -8,7 +8,7 @@
 
 namespace vdbdither::test {
 
-/// A new empty folder that is removed with all it holds.
+/// A new empty folder that is removed with its contents.
 class ScratchFolder {
  public:
   ScratchFolder();
@@ -28,7 +28,7 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// Every file under `folder`, hidden ones too: relative name and bytes.
+/// Returns every file under `folder`, including hidden files: relative name and bytes.
 std::map<std::string, std::vector<std::uint8_t>> filesUnder(const std::filesystem::path& folder);
 
 }  // namespace vdbdither::test

@@ -10,7 +10,7 @@ using openvdb::Vec3d;
 
 namespace {
 
-/// Two triangles of the quad a, b, c, d (counter-clockwise seen from outside).
+/// Adds two triangles of the quad a, b, c, d (counter-clockwise seen from outside).
 void addQuad(Mesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
   mesh.triangles.push_back({a, b, c});
   mesh.triangles.push_back({a, c, d});

@@ -16,7 +16,7 @@ Mesh sphereMesh(const openvdb::Vec3d& centre, double radius, int rings);
 /// A torus around the z axis; `rings` segments around the axis, half as many around the tube.
 Mesh torusMesh(const openvdb::Vec3d& centre, double ring_radius, double tube_radius, int rings);
 
-/// `mesh` turned about the axes x, then y, then z (degrees), then moved.
+/// Returns `mesh` rotated about the axes x, then y, then z (degrees), then moved.
 Mesh transformed(Mesh mesh, const openvdb::Vec3d& degrees, const openvdb::Vec3d& move);
 
 /// `mesh` with every triangle turned round.

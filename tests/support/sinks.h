@@ -9,7 +9,7 @@
 
 namespace vdbdither::test {
 
-/// The registered sink of that name with its options set, and what it says.
+/// The registered sink of that name with its options set, and its messages.
 class SinkCalled {
  public:
   SinkCalled(const std::string& name, const std::vector<std::string>& arguments);
@@ -19,7 +19,7 @@ class SinkCalled {
 
   /// Plans it, gives it the grids in slabs of `height` layers, and finishes.
   void run(const Schema& schema, const Grids& grids, int height = 8) const;
-  /// The same with the schema's own grids.
+  /// The same with the grids of the schema.
   void run(const Schema& schema = {}, int height = 8) const { run(schema, schema.grids, height); }
 
   Listener said;

@@ -13,7 +13,7 @@ namespace {
 
 /// A copy of `grid` within `valid`; outside, every voxel of `box` is active and holds rubbish.
 GridConstPtr spoiled(const GridConstPtr& grid, ZRange valid, const CoordBBox& box) {
-  const std::vector<Layers> pieces{{grid, {valid.begin - 4096, valid.end + 4096}}};
+  const std::vector<GridLayers> pieces{{grid, {valid.begin - 4096, valid.end + 4096}}};
   const openvdb::GridBase::Ptr copy = joinLayers(pieces, valid)->deepCopyGrid();
   const auto fill = [&](auto& typed, const auto& rubbish) {
     for (const ZRange outside :
@@ -46,7 +46,7 @@ std::vector<Slab> cutIntoSlabs(const Grids& grids, const Lattice& lattice, int h
   for (const ZRange core : slabsOf(layers, height)) {
     Slab& slab = slabs.emplace_back(Slab{core, core, {}});
     for (const auto& [name, grid] : grids) {
-      const Layers piece{grid, layers};
+      const GridLayers piece{grid, layers};
       slab.grids[name] = joinLayers({&piece, 1}, core);
     }
   }

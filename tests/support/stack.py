@@ -14,18 +14,18 @@ from PIL import Image
 
 
 def sums(folder):
-    """The SHA-256 of every slice, in order of their layers; they are checked against the files."""
+    """Returns the SHA-256 of every slice in order of their layers. Checks them against the files."""
     folder = pathlib.Path(folder)
     manifest = json.loads((folder / "manifest.json").read_text())
     found = []
     for entry in manifest["slices"]:
         found.append(hashlib.sha256((folder / entry["file"]).read_bytes()).hexdigest())
-        assert found[-1] == entry["sha256"], f"{entry['file']}: its SHA-256 is not the manifest's"
+        assert found[-1] == entry["sha256"], f"{entry['file']}: its SHA-256 differs from the manifest"
     return found
 
 
 def check(folder):
-    """Throws AssertionError where a stack of RGBA slices is not what its manifest says. Returns the manifest."""
+    """Raises AssertionError if a stack of RGBA slices does not agree with its manifest. Returns the manifest."""
     folder = pathlib.Path(folder)
     manifest = json.loads((folder / "manifest.json").read_text())
     width, height, layers = manifest["size"]

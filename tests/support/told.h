@@ -8,7 +8,7 @@
 
 namespace vdbdither::test {
 
-/// Keeps what an operator tells.
+/// Records the messages of an operator.
 class Listener : public Reporter {
  public:
   void warn(const std::string& text) override { warnings.push_back(text); }

@@ -9,30 +9,30 @@
 
 namespace vdbdither::test {
 
-/// A signed distance in mm at a position in mm, < 0 inside.
+/// Returns a signed distance in mm at a position in mm, < 0 inside.
 using Distance = std::function<double(const openvdb::Vec3d&)>;
 
 Distance sphere(const openvdb::Vec3d& centre, double radius);
 
-/// A box with half its edges in `half`, turned about x, then y, then z (degrees).
+/// A box with half edges `half`, rotated about x, then y, then z (degrees).
 Distance box(const openvdb::Vec3d& centre, const openvdb::Vec3d& half,
              const openvdb::Vec3d& degrees = openvdb::Vec3d(0.0));
 
 /// A torus around an axis parallel to z.
 Distance torus(const openvdb::Vec3d& centre, double ring_radius, double tube_radius);
 
-/// Of a Mimaki 3DUJ-553, a Stratasys J750, and cubes.
+/// The pitches of a Mimaki 3DUJ-553, a Stratasys J750, and cubes.
 const std::vector<openvdb::Vec3d>& testPitches();
 
 /// A sphere, a tilted box, a torus and a thin plate.
 struct TestShape {
   const char* name;
   Distance distance;
-  openvdb::Vec3d extent_mm;  ///< half of what it takes up, about the origin
+  openvdb::Vec3d extent_mm;  ///< half of its size, about the origin
 };
 const std::vector<TestShape>& testShapes();
 
-/// The lattice over the box from -extent_mm to extent_mm, plus `padding_mm`.
+/// Returns the lattice over the box from -extent_mm to extent_mm, plus `padding_mm`.
 Lattice latticeAround(const openvdb::Vec3d& pitch_mm, const openvdb::Vec3d& extent_mm,
                       double padding_mm);
 
@@ -75,18 +75,18 @@ class Volume {
   std::vector<T> values_;
 };
 
-/// Which voxels of a set are in it.
+/// A set of voxels: not 0 where a voxel belongs to it.
 using Voxels = Volume<char>;
 
-/// The values of `grid` over `box`.
+/// Return the values of `grid` over `box`.
 Voxels dense(const openvdb::BoolGrid& grid, const openvdb::CoordBBox& box);
 Volume<float> dense(const openvdb::FloatGrid& grid, const openvdb::CoordBBox& box);
 Volume<openvdb::Vec3s> dense(const openvdb::Vec3SGrid& grid, const openvdb::CoordBBox& box);
 
-/// Where two volumes over one box differ.
+/// Returns the number of voxels in which two volumes over one box differ.
 int differences(const Voxels& a, const Voxels& b);
 
-/// How many groups of voxels there are that touch by faces, or by faces, edges and corners.
+/// Returns the number of groups of voxels that touch by faces, or by faces, edges and corners.
 enum class Touching { faces, corners };
 int components(Voxels voxels, Touching touching);
 

@@ -24,7 +24,7 @@ Slab widened(Slab slab, ZRange incoming, ZRange window) {
   if (slab.core == core) return slab;
   for (auto& [name, grid] : slab.grids) {
     // A range of leaves never equals that of a whole grid, so the join cuts what is outside.
-    const Layers piece{grid, {core.begin - leaf_layers, core.end + leaf_layers}};
+    const GridLayers piece{grid, {core.begin - leaf_layers, core.end + leaf_layers}};
     grid = joinLayers({&piece, 1}, core);
   }
   return slab;

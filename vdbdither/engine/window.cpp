@@ -8,7 +8,7 @@ Slab cutTo(const Slab& slab, ZRange core) {
   if (core == slab.core) return slab;
   Slab cut{core, core, {}};
   for (const auto& [name, grid] : slab.grids) {
-    const Layers piece{grid, slab.core};
+    const GridLayers piece{grid, slab.core};
     cut.grids[name] = joinLayers({&piece, 1}, core);
   }
   return cut;
@@ -45,7 +45,7 @@ GridConstPtr Window::inputGrid(Slab& slab, const Read& read, ZRange core) {
     return intersection(alignedToLeaves(reached(range, read.reach, layers_)), layers_);
   };
   const ZRange wanted = wanted_around(core);
-  std::vector<Layers> halo;
+  std::vector<GridLayers> halo;
   for (const Slab& piece : slabs_) {
     const auto found = piece.grids.find(read.grid);
     if (found == piece.grids.end() || intersection(piece.core, wanted).empty()) continue;
@@ -58,7 +58,7 @@ GridConstPtr Window::inputGrid(Slab& slab, const Read& read, ZRange core) {
       core.end < cores_.end ? wanted_around({core.end, core.end + 1}).begin : core.end;
   if (core == slab.core && kept_begin > core.begin && own->second.use_count() == 1 &&
       !halo.empty()) {
-    const Layers whole{own->second, core};
+    const GridLayers whole{own->second, core};
     const GridConstPtr kept = joinLayers({&whole, 1}, {kept_begin, core.end});
     const auto grid = std::const_pointer_cast<openvdb::GridBase>(own->second);
     if (addLayers(*grid, core, halo, wanted)) {
@@ -73,7 +73,7 @@ GridConstPtr Window::inputGrid(Slab& slab, const Read& read, ZRange core) {
 Slab Window::joined() const {
   Slab all{layers_, layers_, {}};
   for (const auto& [name, first] : slabs_.front().grids) {
-    std::vector<Layers> pieces;
+    std::vector<GridLayers> pieces;
     for (const Slab& slab : slabs_) pieces.push_back({slab.grids.find(name)->second, slab.core});
     all.grids[name] = joinLayers(pieces, layers_);
   }

@@ -165,8 +165,8 @@ class LayerCopy {
 /// Copies the layers of all `pieces` within `wanted` into a grid of their type that has nothing
 /// there yet.
 template <typename GridT>
-void copyLayers(std::span<const Layers> pieces, ZRange wanted, GridT& target) {
-  for (const Layers& piece : pieces) {
+void copyLayers(std::span<const GridLayers> pieces, ZRange wanted, GridT& target) {
+  for (const GridLayers& piece : pieces) {
     const ZRange range = intersection(piece.range, wanted);
     if (!range.empty())
       LayerCopy(static_cast<const GridT&>(*piece.grid).tree(), target.tree(), range).run();
@@ -208,7 +208,7 @@ bool endsWithin(const Tree& tree, ZRange range) {
 
 }  // namespace
 
-GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted) {
+GridConstPtr joinLayers(std::span<const GridLayers> pieces, ZRange wanted) {
   if (pieces.size() == 1 && within(pieces.front().range, wanted)) return pieces.front().grid;
   GridConstPtr result;
   visitGrid(*pieces.front().grid, [&](const auto& first) {
@@ -220,7 +220,7 @@ GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted) {
   return result;
 }
 
-bool addLayers(GridBase& grid, ZRange own, std::span<const Layers> pieces, ZRange wanted) {
+bool addLayers(GridBase& grid, ZRange own, std::span<const GridLayers> pieces, ZRange wanted) {
   bool could = true;
   visitGrid(grid, [&](const auto& typed) {
     using GridT = std::decay_t<decltype(typed)>;

@@ -8,7 +8,7 @@
 namespace vdbdither {
 
 /// A grid and the layers of it that count.
-struct Layers {
+struct GridLayers {
   GridConstPtr grid;
   ZRange range;
 };
@@ -18,12 +18,13 @@ struct Layers {
 /// ranges meet at multiples of eight. A piece that
 /// is all of the result comes back itself; otherwise nodes are copied. Throws DataError for a grid
 /// type that slabs cannot carry (points, strings).
-GridConstPtr joinLayers(std::span<const Layers> pieces, ZRange wanted);
+GridConstPtr joinLayers(std::span<const GridLayers> pieces, ZRange wanted);
 
 /// Adds the layers of `pieces` within `wanted` to `grid`, which has those of `own` already; `own`
 /// meets the ranges of the pieces at multiples of eight. False, and nothing is done, where `grid`
 /// has something outside the leaves of `own`.
-bool addLayers(openvdb::GridBase& grid, ZRange own, std::span<const Layers> pieces, ZRange wanted);
+bool addLayers(openvdb::GridBase& grid, ZRange own, std::span<const GridLayers> pieces,
+               ZRange wanted);
 
 /// The canonical form: nodes of one value and state are tiles, so that topology depends on the
 /// voxels alone.

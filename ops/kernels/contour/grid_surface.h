@@ -41,7 +41,7 @@ class GridSurface {
 
   /// Returns the voxels of the layers that are inside.
   [[nodiscard]] std::vector<BitLayer> insideOf(const GridConstPtr& grid, ZRange layers) const;
-  [[nodiscard]] const BitFrame& frame() const { return surface_.frame(); }
+  [[nodiscard]] const BitLayout& layout() const { return surface_.layout(); }
 
  private:
   static IsoSurface surfaceOf(const Lattice& lattice, const openvdb::GridBase& prototype,

@@ -101,12 +101,12 @@ void append(Mesh& mesh, const SurfacePiece& piece) {
   mesh.triangles.insert(mesh.triangles.end(), piece.triangles.begin(), piece.triangles.end());
 }
 
-IsoSurface::IsoSurface(const Lattice& lattice) : lattice_(lattice), frame_(lattice.box) {}
+IsoSurface::IsoSurface(const Lattice& lattice) : lattice_(lattice), layout_(lattice.box) {}
 
 IsoSurface::IsoSurface(const Lattice& lattice, Inside inside, float level, float background,
                        Between between)
     : lattice_(lattice),
-      frame_(lattice.box),
+      layout_(lattice.box),
       is_field_(true),
       inside_(inside),
       level_(level),
@@ -127,7 +127,7 @@ SurfacePiece IsoSurface::finish() {
   below_ = std::move(here_);
   here_ = nullptr;
   if (!begun_) return {};
-  return addBits({frame_.emptyLayer()}, {next_layer_, next_layer_ + 1});
+  return addBits({layout_.emptyLayer()}, {next_layer_, next_layer_ + 1});
 }
 
 SurfacePiece IsoSurface::addBits(std::vector<BitLayer> bits, ZRange layers) {
@@ -135,7 +135,7 @@ SurfacePiece IsoSurface::addBits(std::vector<BitLayer> bits, ZRange layers) {
   if (bits.empty()) return piece;
   if (!std::exchange(begun_, true)) {
     first_layer_ = layers.begin;
-    last_.inside = frame_.emptyLayer();
+    last_.inside = layout_.emptyLayer();
     for (CutLines* lines : {&last_.along_x, &last_.along_y}) {
       lines->cut = last_.inside;
       lines->first.assign(last_.inside.size(), 0);
@@ -165,11 +165,13 @@ SurfacePiece IsoSurface::addBits(std::vector<BitLayer> bits, ZRange layers) {
 /// x.
 template <typename Visit>
 void IsoSurface::forEachCell(const Step& step, int row, const Visit& visit) const {
-  if (row + 1 == frame_.rows()) return;
-  const int words = frame_.words();
+  if (row + 1 == layout_.rows()) return;
+  const int words = layout_.words();
   const std::array<const std::uint64_t*, 4> corner_rows{
-      step.lower->inside.data() + frame_.row(row), step.lower->inside.data() + frame_.row(row + 1),
-      step.upper->inside.data() + frame_.row(row), step.upper->inside.data() + frame_.row(row + 1)};
+      step.lower->inside.data() + layout_.row(row),
+      step.lower->inside.data() + layout_.row(row + 1),
+      step.upper->inside.data() + layout_.row(row),
+      step.upper->inside.data() + layout_.row(row + 1)};
   const auto& cases = cubeCases();
   for (int word = 0; word < words; ++word) {
     std::array<std::uint64_t, 4> here{}, next{};
@@ -195,7 +197,7 @@ void IsoSurface::forEachCell(const Step& step, int row, const Visit& visit) cons
 /// Calls work(rows) on all threads for ranges of rows, counted through the steps.
 template <typename Work>
 void IsoSurface::forSomeRows(const std::vector<Step>& steps, const Work& work) const {
-  tbb::parallel_for(RowsOfSteps(0, static_cast<int>(steps.size()) * frame_.rows(), 64), work);
+  tbb::parallel_for(RowsOfSteps(0, static_cast<int>(steps.size()) * layout_.rows(), 64), work);
 }
 
 void IsoSurface::march(std::vector<Step>& steps, SurfacePiece& piece) {
@@ -204,27 +206,27 @@ void IsoSurface::march(std::vector<Step>& steps, SurfacePiece& piece) {
       lines->cut.assign(last_.inside.size(), 0);
       lines->first.assign(last_.inside.size(), 0);
     }
-    step.first_triangle.assign(static_cast<std::size_t>(frame_.rows()), 0);
+    step.first_triangle.assign(static_cast<std::size_t>(layout_.rows()), 0);
   }
   forSomeRows(steps, [&](const RowsOfSteps& rows) {
     for (int n = rows.begin(); n != rows.end(); ++n)
-      findCuts(steps[static_cast<std::size_t>(n / frame_.rows())], n % frame_.rows());
+      findCuts(steps[static_cast<std::size_t>(n / layout_.rows())], n % layout_.rows());
   });
   number(steps, piece);
   forSomeRows(steps, [&](const RowsOfSteps& rows) {
     Values values(*this);
     for (int n = rows.begin(); n != rows.end(); ++n) {
-      const Step& step = steps[static_cast<std::size_t>(n / frame_.rows())];
-      emitVertices(step, n % frame_.rows(), values, piece);
-      emitTriangles(step, n % frame_.rows(), piece);
+      const Step& step = steps[static_cast<std::size_t>(n / layout_.rows())];
+      emitVertices(step, n % layout_.rows(), values, piece);
+      emitTriangles(step, n % layout_.rows(), piece);
     }
   });
 }
 
 /// Finds the cut lines of a row, counts them by word, and counts its triangles.
 void IsoSurface::findCuts(Step& step, int row) const {
-  const int words = frame_.words();
-  const std::size_t begin = frame_.row(row);
+  const int words = layout_.words();
+  const std::size_t begin = layout_.row(row);
   const std::uint64_t* lower = step.lower->inside.data() + begin;
   const std::uint64_t* upper = step.upper->inside.data() + begin;
   const auto count = [](CutLines& lines, std::size_t at, std::uint64_t cut) {
@@ -235,7 +237,7 @@ void IsoSurface::findCuts(Step& step, int row) const {
     const std::size_t at = begin + static_cast<std::size_t>(word);
     count(step.along_z, at, lower[word] ^ upper[word]);
     count(step.upper->along_x, at, upper[word] ^ shiftedDown(upper, word, words));
-    if (row + 1 < frame_.rows()) count(step.upper->along_y, at, upper[word] ^ upper[word + words]);
+    if (row + 1 < layout_.rows()) count(step.upper->along_y, at, upper[word] ^ upper[word + words]);
   }
   forEachCell(step, row, [&](int, const CubeCase& cube) {
     step.first_triangle[static_cast<std::size_t>(row)] += cube.triangles.size();
@@ -277,11 +279,11 @@ void IsoSurface::emitVertices(const Step& step, int row, Values& values,
   const std::uint32_t piece_begin =
       vertex_count_ - static_cast<std::uint32_t>(piece.vertices.size());
   const auto emit = [&](const CutLines& lines, int z, int axis) {
-    for (int word = 0; word < frame_.words(); ++word) {
-      const std::size_t at = frame_.row(row) + static_cast<std::size_t>(word);
+    for (int word = 0; word < layout_.words(); ++word) {
+      const std::size_t at = layout_.row(row) + static_cast<std::size_t>(word);
       std::uint32_t vertex = lines.first[at] - piece_begin;
       forEachBitOf(lines.cut[at], [&](int n) {
-        const Coord from(frame_.xBegin() + word * word_bits + n, frame_.yBegin() + row, z);
+        const Coord from(layout_.xBegin() + word * word_bits + n, layout_.yBegin() + row, z);
         Vec3d index = from.asVec3d();
         index[axis] += values.share(from, axis);
         piece.vertices[vertex++] = lattice_.origin_mm + index * lattice_.pitch_mm;
@@ -303,11 +305,11 @@ void IsoSurface::emitTriangles(const Step& step, int row, SurfacePiece& piece) c
       const int second = edge >> 1 & 1;
       const Layer& layer = second ? *step.upper : *step.lower;
       if (edge < 4) {
-        vertex[edge] = layer.along_x.vertex(frame_.row(row + first), x);
+        vertex[edge] = layer.along_x.vertex(layout_.row(row + first), x);
       } else if (edge < 8) {
-        vertex[edge] = layer.along_y.vertex(frame_.row(row), x + first);
+        vertex[edge] = layer.along_y.vertex(layout_.row(row), x + first);
       } else {
-        vertex[edge] = step.along_z.vertex(frame_.row(row + second), x + first);
+        vertex[edge] = step.along_z.vertex(layout_.row(row + second), x + first);
       }
     });
     for (const auto& t : cube.triangles)

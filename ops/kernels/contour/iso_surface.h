@@ -63,13 +63,13 @@ class IsoSurface {
   /// Returns the voxels of the layers that are inside.
   [[nodiscard]] std::vector<BitLayer> insideOf(const openvdb::BoolGrid& voxels,
                                                ZRange layers) const {
-    return bitLayers(voxels, frame_, layers);
+    return bitLayers(voxels, layout_, layers);
   }
   [[nodiscard]] std::vector<BitLayer> insideOf(const openvdb::FloatGrid& field,
                                                ZRange layers) const {
-    return bitLayers(field, frame_, layers, inside_, level_);
+    return bitLayers(field, layout_, layers, inside_, level_);
   }
-  [[nodiscard]] const BitFrame& frame() const { return frame_; }
+  [[nodiscard]] const BitLayout& layout() const { return layout_; }
 
  private:
   /// The lines along one axis that the surface cuts, and their vertices: `first` of a word is the
@@ -99,7 +99,7 @@ class IsoSurface {
   void forEachCell(const Step& step, int row, const Visit& visit) const;
 
   Lattice lattice_;
-  BitFrame frame_;
+  BitLayout layout_;
   bool is_field_ = false;
   Inside inside_ = Inside::below;
   float level_ = 0;

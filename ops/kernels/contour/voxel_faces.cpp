@@ -14,7 +14,7 @@ using openvdb::Vec3d;
 SurfacePiece VoxelFaces::add(BitLayer layer, int z) {
   SurfacePiece piece;
   if (here_.empty()) {
-    below_ = frame_.emptyLayer();
+    below_ = layout_.emptyLayer();
   } else {
     emit(layer, piece);
     below_ = std::move(here_);
@@ -27,7 +27,7 @@ SurfacePiece VoxelFaces::add(BitLayer layer, int z) {
 
 SurfacePiece VoxelFaces::finish() {
   SurfacePiece piece;
-  if (!here_.empty()) emit(frame_.emptyLayer(), piece);
+  if (!here_.empty()) emit(layout_.emptyLayer(), piece);
   piece.open_from = vertices_;
   return piece;
 }
@@ -54,12 +54,12 @@ void VoxelFaces::emit(const BitLayer& above, SurfacePiece& piece) {
     vertices_ += 4;
   };
   const auto word = [&](const BitLayer& layer, int row, int column) {
-    if (row < 0 || row >= frame_.rows() || column < 0 || column >= frame_.words())
+    if (row < 0 || row >= layout_.rows() || column < 0 || column >= layout_.words())
       return std::uint64_t{0};
-    return layer[frame_.row(row) + static_cast<std::size_t>(column)];
+    return layer[layout_.row(row) + static_cast<std::size_t>(column)];
   };
-  for (int row = 0; row < frame_.rows(); ++row) {
-    for (int column = 0; column < frame_.words(); ++column) {
+  for (int row = 0; row < layout_.rows(); ++row) {
+    for (int column = 0; column < layout_.words(); ++column) {
       const std::uint64_t here = word(here_, row, column);
       if (here == 0) continue;
       const std::uint64_t left = here << 1 | word(here_, row, column - 1) >> 63;
@@ -72,7 +72,7 @@ void VoxelFaces::emit(const BitLayer& above, SurfacePiece& piece) {
                                                     word(above, row, column)};
       for (std::size_t side = 0; side < neighbours.size(); ++side) {
         for (std::uint64_t open = here & ~neighbours[side]; open != 0; open &= open - 1)
-          face(frame_.xBegin() + 64 * column + std::countr_zero(open), frame_.yBegin() + row,
+          face(layout_.xBegin() + 64 * column + std::countr_zero(open), layout_.yBegin() + row,
                static_cast<int>(side / 2), side % 2 == 0 ? -1 : 1);
       }
     }

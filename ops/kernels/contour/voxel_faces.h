@@ -14,9 +14,9 @@ namespace vdbdither {
 /// counts as empty.
 class VoxelFaces {
  public:
-  explicit VoxelFaces(const Lattice& lattice) : lattice_(lattice), frame_(lattice.box) {}
+  explicit VoxelFaces(const Lattice& lattice) : lattice_(lattice), layout_(lattice.box) {}
 
-  [[nodiscard]] const BitFrame& frame() const { return frame_; }
+  [[nodiscard]] const BitLayout& layout() const { return layout_; }
 
   /// Takes layer `z`, the one above the last. Returns the faces of the layer below it.
   SurfacePiece add(BitLayer layer, int z);
@@ -27,7 +27,7 @@ class VoxelFaces {
   void emit(const BitLayer& above, SurfacePiece& piece);
 
   Lattice lattice_;
-  BitFrame frame_;
+  BitLayout layout_;
   BitLayer below_, here_;
   int z_ = 0;
   std::uint32_t vertices_ = 0;

@@ -36,14 +36,14 @@ struct Cell {
   /// of them.
   [[nodiscard]] bool maybeCrossed() const {
     if (!uniform()) return true;
-    double bend = 0;
+    double change = 0;
     for (const auto& along : bend) {
       double maximum = 0;
       for (const double b : along) maximum = std::max(maximum, std::abs(b));
-      bend += maximum / 8;
+      change += maximum / 8;
     }
     return std::any_of(value.begin(), value.end(),
-                       [&](double v) { return std::abs(v) <= bend * (1 + 1e-9); });
+                       [&](double v) { return std::abs(v) <= change * (1 + 1e-9); });
   }
 
   struct Sample {

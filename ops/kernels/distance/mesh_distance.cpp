@@ -168,7 +168,7 @@ void MeshDistance::append(const CoordBBox& voxels, DistanceGrids& grids) const {
         if (leaf.closest) closest->set(std::move(leaf.closest));
         surface.set(std::move(leaf.surface));
       }
-      for (const LeafRun& run : made[n].interior) surface.set(run, -grids.surface->background());
+      for (const LeafSpan& span : made[n].interior) surface.set(span, -grids.surface->background());
       made[n] = {};
     }
   });

@@ -61,7 +61,7 @@ struct DistanceGrids {
 ///   between neighbouring triangles: right on every closed mesh, with cavities and parts in any
 ///   orientation;
 /// - the bits depend on the mesh, the lattice and the band alone: not on how the layers are cut
-/// into runs, on threads
+/// into spans, on threads
 ///   or on the instruction set. The tree is in canonical form: no leaf without an active voxel or a
 ///   change of sign, the interior as tiles.
 ///

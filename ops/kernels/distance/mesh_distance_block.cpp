@@ -193,17 +193,17 @@ MeshDistance::Block::Made MeshDistance::Block::sweep() const {
   std::array<RowWinding, leaf_rows * LeafDistances::depth> rows;
   std::uint64_t filled = 0;   // rows with some of the inside in the last plane
   std::uint64_t running = 0;  // rows whose last leaf was wholly inside
-  std::array<LeafRun, leaf_rows * LeafDistances::depth> runs;
-  const auto end_runs = [&](std::uint64_t ended) {
+  std::array<LeafSpan, leaf_rows * LeafDistances::depth> spans;
+  const auto end_spans = [&](std::uint64_t ended) {
     for (; ended != 0; ended &= ended - 1) {
-      made.add(runs[static_cast<std::size_t>(std::countr_zero(ended))]);
+      made.add(spans[static_cast<std::size_t>(std::countr_zero(ended))]);
       running &= ~(ended & -ended);
     }
   };
   for (int x = leaves_.min().x(); x <= leaves_.max().x(); ++x) {
     const std::size_t first = work_.distances.slot({x, leaves_.min().y(), leaves_.min().z()});
     const std::uint64_t occupied = work_.distances.occupied(x);
-    end_runs(running & (occupied | ~filled));
+    end_spans(running & (occupied | ~filled));
     for (std::uint64_t left = occupied | filled; left != 0; left &= left - 1) {
       const auto row = static_cast<std::uint32_t>(std::countr_zero(left));
       RowWinding& winding = rows[row];
@@ -211,16 +211,16 @@ MeshDistance::Block::Made MeshDistance::Block::sweep() const {
                        leaves_.min().z() + static_cast<int>(row) % LeafDistances::depth);
       const CoordBBox box = CoordBBox::createCube(leaf << 3, edge);
       if (!(occupied >> row & 1) && winding.bits() == ~0ULL && voxels_.isInside(box)) {
-        if ((running >> row & 1) == 0) runs[row] = {box.min(), 0};
+        if ((running >> row & 1) == 0) spans[row] = {box.min(), 0};
         running |= std::uint64_t{1} << row;
-        ++runs[row].leaves;
+        ++spans[row].leaves;
         continue;
       }
       makeLeaf(leaf, winding.advance(work_.distances, first + row), made);
       filled = (filled & ~(1ULL << row)) | std::uint64_t{winding.bits() != 0} << row;
     }
   }
-  end_runs(running);
+  end_spans(running);
   return made;
 }
 
@@ -255,7 +255,7 @@ void MeshDistance::Block::makeLeaf(const Coord& leaf_index, const LeafBits& insi
       std::any_of(active.begin(), active.end(), [](std::uint64_t bits) { return bits != 0; });
   if (!any_active && !any_inside) return;
   if (!any_active && !any_outside) {
-    made.add(LeafRun{origin, 1});
+    made.add(LeafSpan{origin, 1});
     return;
   }
   for (std::size_t plane = 0; plane < edge; ++plane)

@@ -34,19 +34,19 @@ class MeshDistance::Block {
   /// What it comes to.
   struct Made {
     std::vector<Leaf> leaves;
-    std::vector<LeafRun> interior;        ///< leaves that are wholly inside
+    std::vector<LeafSpan> interior;       ///< leaves that are wholly inside
     std::vector<openvdb::Coord> parents;  ///< origins of the few nodes above all of them
 
     void add(Leaf leaf) {
       noteParent(leaf.surface->origin());
       leaves.push_back(std::move(leaf));
     }
-    void add(const LeafRun& run) {
-      const int end = run.origin.x() + run.leaves * leaf_layers;
-      for (openvdb::Coord at = NodeWriter<openvdb::FloatTree>::parentOf(run.origin); at.x() < end;
+    void add(const LeafSpan& span) {
+      const int end = span.origin.x() + span.leaves * leaf_layers;
+      for (openvdb::Coord at = NodeWriter<openvdb::FloatTree>::parentOf(span.origin); at.x() < end;
            at.x() += static_cast<int>(NodeWriter<openvdb::FloatTree>::Parent::DIM))
         noteParent(at);
-      interior.push_back(run);
+      interior.push_back(span);
     }
 
    private:

@@ -157,8 +157,7 @@ void RowCrossings::visit(const std::array<openvdb::Vec3d, 3>& corners,
       const double before_mm = (i - 1) * pitch_mm_.x();
       if (i > box.min().x() && x - before_mm <= pitch_mm_.x() / 4) {
         if (tolerance_mm < 0) tolerance_mm = toleranceAlongX(corners);
-        const double limit_mm =
-            std::max(x - tolerance_mm, std::min(x, x_low) - 4 * rounding_mm_);
+        const double limit_mm = std::max(x - tolerance_mm, std::min(x, x_low) - 4 * rounding_mm_);
         if (before_mm >= limit_mm) --i;
       }
       if (i <= box.max().x()) visit(openvdb::Coord(i, j, k), delta);

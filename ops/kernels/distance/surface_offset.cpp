@@ -99,7 +99,7 @@ double SurfaceOffset::greatestMm() const {
   return std::max(std::abs(minimum), std::abs(maximum));
 }
 
-SurfaceOffset::Layers SurfaceOffset::reach() const {
+SurfaceOffset::Reach SurfaceOffset::reach() const {
   if (!varies()) return {1, 0};  // for ties
   if (at == At::foot) {
     const int steps = static_cast<int>(std::ceil(held_mm / lattice.pitch_mm.z() + 0.5));

@@ -36,11 +36,11 @@ struct SurfaceOffset {
   /// The band of d′.
   [[nodiscard]] float backgroundMm() const { return static_cast<float>(held_mm - greatestMm()); }
 
-  struct Layers {
+  struct Reach {
     int surface = 0;
     int heights = 0;
   };
-  [[nodiscard]] Layers reach() const;
+  [[nodiscard]] Reach reach() const;
 
   /// Returns d′ over `core`. Voxels whose v̄ is not found, or that have no normal, are displaced by
   /// the constant alone. Throws DataError if a height of the grid exceeds the limit.

@@ -254,17 +254,17 @@ openvdb::FloatGrid::Ptr makeDisplacedGrid(const openvdb::FloatGrid& surface) {
   return grid;
 }
 
-ShapeDither::Layers ShapeDither::reach(bool normals_given) const {
+ShapeDither::Reach ShapeDither::reach(bool normals_given) const {
   if (amplitude == 0) return {};
-  Layers layers;
-  if (at == DitherAt::closest) layers.normals = SearchDisk(pitch_mm, searchRadiusMm()).halo().z();
+  Reach reach;
+  if (at == DitherAt::closest) reach.normals = SearchDisk(pitch_mm, searchRadiusMm()).halo().z();
   if (at == DitherAt::foot)
-    layers.normals = static_cast<int>(std::ceil(largestDisplacementMm() / pitch_mm.z() + 0.5));
+    reach.normals = static_cast<int>(std::ceil(largestDisplacementMm() / pitch_mm.z() + 0.5));
   // One more for the neighbours that decide whether a voxel is a surface voxel, and for the
   // gradient.
-  if (at == DitherAt::closest || !normals_given) layers.surface = layers.normals + 1;
-  if (guarded) layers.surface = std::max(layers.surface, WallGuard::reachLayers(amplitude));
-  return layers;
+  if (at == DitherAt::closest || !normals_given) reach.surface = reach.normals + 1;
+  if (guarded) reach.surface = std::max(reach.surface, WallGuard::reachLayers(amplitude));
+  return reach;
 }
 
 ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,

@@ -49,11 +49,11 @@ struct ShapeDither {
   }
 
   /// The layers around a voxel on which its state depends.
-  struct Layers {
+  struct Reach {
     int surface = 0;
     int normals = 0;  ///< 0 if none are given: they are computed from the surface
   };
-  [[nodiscard]] Layers reach(bool normals_given) const;
+  [[nodiscard]] Reach reach(bool normals_given) const;
 
   struct Result {
     openvdb::BoolGrid::Ptr solid;       ///< V′

@@ -72,13 +72,13 @@ std::uint64_t rowsAlongX(const LeafBits& bits, unsigned y) {
 
 template <typename Voxels>
 std::vector<BitLayer> layersOf(const openvdb::Grid<typename Voxels::Tree>& grid,
-                               const BitFrame& frame, ZRange layers, const Voxels& voxels) {
+                               const BitLayout& layout, ZRange layers, const Voxels& voxels) {
   std::vector<BitLayer> made(static_cast<std::size_t>(std::max(0, layers.size())),
-                             frame.emptyLayer());
-  const openvdb::CoordBBox& box = frame.box();
+                             layout.emptyLayer());
+  const openvdb::CoordBBox& box = layout.box();
   if (made.empty() || box.empty()) return made;
-  const int first_bit = box.min().x() - frame.xBegin();
-  const int last_bit = box.max().x() - frame.xBegin();
+  const int first_bit = box.min().x() - layout.xBegin();
+  const int last_bit = box.max().x() - layout.xBegin();
   const int first_leaf_y = box.min().y() & ~(leaf_layers - 1);
   const int last_leaf_y = box.max().y() & ~(leaf_layers - 1);
   const ZRange aligned = alignedToLeaves(layers);
@@ -90,15 +90,15 @@ std::vector<BitLayer> layersOf(const openvdb::Grid<typename Voxels::Tree>& grid,
     for (int z = aligned.begin; z < aligned.end; z += leaf_layers) {
       const ZRange here = intersection({z, z + leaf_layers}, layers);
       const auto set = [&](int byte, unsigned local_y, std::uint64_t rows_by_z) {
-        const int row = y + static_cast<int>(local_y) - frame.yBegin();
-        const std::size_t word = frame.row(row) + static_cast<std::size_t>(byte / 8);
+        const int row = y + static_cast<int>(local_y) - layout.yBegin();
+        const std::size_t word = layout.row(row) + static_cast<std::size_t>(byte / 8);
         for (int k = here.begin; k < here.end; ++k) {
           made[static_cast<std::size_t>(k - layers.begin)][word] |=
               (rows_by_z >> (8 * (k - z)) & 0xFF) << (8 * (byte % 8));
         }
       };
       for (int byte = first_bit / 8; byte <= last_bit / 8; ++byte) {
-        const Coord origin(frame.xBegin() + 8 * byte, y, z);
+        const Coord origin(layout.xBegin() + 8 * byte, y, z);
         if (const auto* leaf = accessor.probeConstLeaf(origin)) {
           const LeafBits bits = voxels.leaf(*leaf);
           for (int at = std::max(y, box.min().y()); at < y_end; ++at) {
@@ -116,7 +116,7 @@ std::vector<BitLayer> layersOf(const openvdb::Grid<typename Voxels::Tree>& grid,
     }
     // Clears the bits of these words that lie beyond the box.
     for (int at = std::max(y, box.min().y()); at < y_end; ++at) {
-      const std::size_t begin = frame.row(at - frame.yBegin());
+      const std::size_t begin = layout.row(at - layout.yBegin());
       for (BitLayer& layer : made) {
         layer[begin + static_cast<std::size_t>(first_bit / word_bits)] &=
             ~std::uint64_t{0} << (first_bit % word_bits);
@@ -130,21 +130,21 @@ std::vector<BitLayer> layersOf(const openvdb::Grid<typename Voxels::Tree>& grid,
 
 }  // namespace
 
-BitFrame::BitFrame(const openvdb::CoordBBox& box) : box_(box) {
+BitLayout::BitLayout(const openvdb::CoordBBox& box) : box_(box) {
   x_begin_ = (box.min().x() - 1) & ~(leaf_layers - 1);
   y_begin_ = box.min().y() - 1;
   words_ = box.empty() ? 0 : (box.max().x() + 1 - x_begin_) / word_bits + 1;
   rows_ = box.empty() ? 0 : box.dim().y() + 2;
 }
 
-std::vector<BitLayer> bitLayers(const openvdb::BoolGrid& grid, const BitFrame& frame,
+std::vector<BitLayer> bitLayers(const openvdb::BoolGrid& grid, const BitLayout& layout,
                                 ZRange layers) {
-  return layersOf(grid, frame, layers, TrueVoxels{});
+  return layersOf(grid, layout, layers, TrueVoxels{});
 }
 
-std::vector<BitLayer> bitLayers(const openvdb::FloatGrid& grid, const BitFrame& frame,
+std::vector<BitLayer> bitLayers(const openvdb::FloatGrid& grid, const BitLayout& layout,
                                 ZRange layers, Inside inside, float level) {
-  return layersOf(grid, frame, layers, ScalarVoxels{inside, level});
+  return layersOf(grid, layout, layers, ScalarVoxels{inside, level});
 }
 
 }  // namespace vdbdither

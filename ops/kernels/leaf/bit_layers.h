@@ -10,15 +10,15 @@
 
 namespace vdbdither {
 
-/// The voxels of a layer that belong to a set, one bit each: row after row, `BitFrame::words` words
-/// per row, x rising from the lowest bit of the first word.
+/// The voxels of a layer that belong to a set, one bit each: row after row, `BitLayout::words`
+/// words per row, x rising from the lowest bit of the first word.
 using BitLayer = std::vector<std::uint64_t>;
 
 /// The layout of a box of voxels in bit layers. On each side of the box, in x and in y, at least
 /// one more voxel has a bit, which is never set.
-class BitFrame {
+class BitLayout {
  public:
-  explicit BitFrame(const openvdb::CoordBBox& box);
+  explicit BitLayout(const openvdb::CoordBBox& box);
 
   [[nodiscard]] const openvdb::CoordBBox& box() const { return box_; }
   [[nodiscard]] int words() const { return words_; }
@@ -46,13 +46,13 @@ class BitFrame {
 /// it (for occupancies).
 enum class Inside { below, above };
 
-/// Returns one bit layer for each of `layers`: the voxels of the frame's box that are active and
+/// Returns one bit layer for each of `layers`: the voxels of the layout's box that are active and
 /// true.
-std::vector<BitLayer> bitLayers(const openvdb::BoolGrid& grid, const BitFrame& frame,
+std::vector<BitLayer> bitLayers(const openvdb::BoolGrid& grid, const BitLayout& layout,
                                 ZRange layers);
 
 /// The same for the voxels, active or not, whose values are below or above `level`.
-std::vector<BitLayer> bitLayers(const openvdb::FloatGrid& grid, const BitFrame& frame,
+std::vector<BitLayer> bitLayers(const openvdb::FloatGrid& grid, const BitLayout& layout,
                                 ZRange layers, Inside inside, float level);
 
 }  // namespace vdbdither

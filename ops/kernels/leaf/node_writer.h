@@ -19,7 +19,7 @@ typename Tree::LeafNodeType* newLeaf(const openvdb::Coord& origin,
 }
 
 /// Adjacent leaves along x, the first at `origin`.
-struct LeafRun {
+struct LeafSpan {
   openvdb::Coord origin;
   int leaves;
 };
@@ -48,9 +48,9 @@ class NodeWriter {
     parent.addLeaf(leaf.release());
   }
 
-  void set(const LeafRun& run, const typename Tree::ValueType& value) {
-    for (int leaf = 0; leaf < run.leaves; ++leaf) {
-      const openvdb::Coord origin = run.origin.offsetBy(leaf * leaf_layers, 0, 0);
+  void set(const LeafSpan& span, const typename Tree::ValueType& value) {
+    for (int leaf = 0; leaf < span.leaves; ++leaf) {
+      const openvdb::Coord origin = span.origin.offsetBy(leaf * leaf_layers, 0, 0);
       parentAt(origin).addTile(Parent::coordToOffset(origin), value, false);
     }
   }

@@ -13,9 +13,9 @@ namespace {
 
 constexpr int word_bits = 64;
 
-/// Calls visit(begin, end) for every run of set bits of a row; with `flip`, of unset bits.
+/// Calls visit(begin, end) for every span of set bits of a row; with `flip`, of unset bits.
 template <typename Visit>
-void forEachRun(const std::uint64_t* row, int words, bool flip, const Visit& visit) {
+void forEachSpan(const std::uint64_t* row, int words, bool flip, const Visit& visit) {
   const std::uint64_t mask = flip ? ~std::uint64_t{0} : 0;
   int begin = -1;
   for (int word = 0; word < words; ++word) {
@@ -58,9 +58,10 @@ class Sets {
   std::vector<std::uint32_t> parent_;
 };
 
-/// Calls join(a, b) for the touching runs of two rows; `aside` is 1 if corners touch.
-template <typename Run, typename Join>
-void forEachTouching(std::span<const Run> a, std::span<const Run> b, int aside, const Join& join) {
+/// Calls join(a, b) for the touching spans of two rows; `aside` is 1 if corners touch.
+template <typename Span, typename Join>
+void forEachTouching(std::span<const Span> a, std::span<const Span> b, int aside,
+                     const Join& join) {
   for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
     if (a[i].begin < b[j].end + aside && b[j].begin < a[i].end + aside) join(i, j);
     if (a[i].end < b[j].end) {
@@ -73,18 +74,20 @@ void forEachTouching(std::span<const Run> a, std::span<const Run> b, int aside, 
 
 }  // namespace
 
-VoxelComponents::VoxelComponents(const BitFrame& frame) : frame_(frame) { full_.diagonal = true; }
+VoxelComponents::VoxelComponents(const BitLayout& layout) : layout_(layout) {
+  full_.diagonal = true;
+}
 
 void VoxelComponents::add(const BitLayer& layer) {
   // The layer below the first one is outside too.
-  if (!std::exchange(begun_, true)) addLayer(frame_.emptyLayer());
+  if (!std::exchange(begun_, true)) addLayer(layout_.emptyLayer());
   addLayer(layer);
 }
 
 VoxelComponents::Counts VoxelComponents::finish() {
   Counts counts;
   if (!begun_) return counts;
-  addLayer(frame_.emptyLayer());
+  addLayer(layout_.emptyLayer());
   const auto sorted = [](std::vector<std::uint64_t> sizes) {
     std::sort(sizes.begin(), sizes.end(), std::greater<>());
     return sizes;
@@ -97,44 +100,44 @@ VoxelComponents::Counts VoxelComponents::finish() {
 
 void VoxelComponents::addLayer(const BitLayer& layer) {
   for (Pieces* pieces : {&full_, &empty_}) {
-    std::vector<Run> runs;
+    std::vector<Span> spans;
     std::vector<std::size_t> rows{0};
-    for (int row = 0; row < frame_.rows(); ++row) {
-      forEachRun(layer.data() + frame_.row(row), frame_.words(), pieces == &empty_,
-                 [&](int begin, int end) {
-                   runs.push_back({begin, end, 0});
-                 });
-      rows.push_back(runs.size());
+    for (int row = 0; row < layout_.rows(); ++row) {
+      forEachSpan(layer.data() + layout_.row(row), layout_.words(), pieces == &empty_,
+                  [&](int begin, int end) {
+                    spans.push_back({begin, end, 0});
+                  });
+      rows.push_back(spans.size());
     }
-    addRuns(*pieces, std::move(runs), std::move(rows));
+    addSpans(*pieces, std::move(spans), std::move(rows));
   }
 }
 
-void VoxelComponents::addRuns(Pieces& pieces, std::vector<Run> runs,
-                              std::vector<std::size_t> rows) const {
+void VoxelComponents::addSpans(Pieces& pieces, std::vector<Span> spans,
+                               std::vector<std::size_t> rows) const {
   const auto before = static_cast<std::uint32_t>(pieces.open.size());
-  Sets sets(before + runs.size());
+  Sets sets(before + spans.size());
   const int reach = pieces.diagonal ? 1 : 0;
-  const auto rowOf = [](const std::vector<Run>& of, const std::vector<std::size_t>& begins,
-                        int row) -> std::span<const Run> {
+  const auto rowOf = [](const std::vector<Span>& of, const std::vector<std::size_t>& begins,
+                        int row) -> std::span<const Span> {
     const auto n = static_cast<std::size_t>(row);
     if (row < 0 || n + 1 >= begins.size()) return {};
     return {of.data() + begins[n], begins[n + 1] - begins[n]};
   };
-  for (int row = 0; row < frame_.rows(); ++row) {
-    const std::span<const Run> here = rowOf(runs, rows, row);
+  for (int row = 0; row < layout_.rows(); ++row) {
+    const std::span<const Span> here = rowOf(spans, rows, row);
     const auto number = [&](std::size_t begin, std::size_t n) {
       return before + static_cast<std::uint32_t>(begin + n);
     };
     const std::size_t first = rows[static_cast<std::size_t>(row)];
     if (row > 0) {
       const std::size_t first_above = rows[static_cast<std::size_t>(row - 1)];
-      forEachTouching(here, rowOf(runs, rows, row - 1), reach, [&](std::size_t i, std::size_t j) {
+      forEachTouching(here, rowOf(spans, rows, row - 1), reach, [&](std::size_t i, std::size_t j) {
         sets.join(number(first, i), number(first_above, j));
       });
     }
     for (int other = row - reach; other <= row + reach; ++other) {
-      const std::span<const Run> below = rowOf(pieces.runs, pieces.rows, other);
+      const std::span<const Span> below = rowOf(pieces.spans, pieces.rows, other);
       forEachTouching(here, below, reach, [&](std::size_t i, std::size_t j) {
         sets.join(number(first, i), below[j].piece);
       });
@@ -143,27 +146,27 @@ void VoxelComponents::addRuns(Pieces& pieces, std::vector<Run> runs,
 
   // Pieces that continue get new numbers; the others are complete.
   constexpr auto none = ~std::uint32_t{0};
-  std::vector<std::uint32_t> renamed(before + runs.size(), none);
+  std::vector<std::uint32_t> renamed(before + spans.size(), none);
   std::vector<std::uint64_t> open;
-  for (std::size_t n = 0; n < runs.size(); ++n) {
+  for (std::size_t n = 0; n < spans.size(); ++n) {
     const std::uint32_t root = sets.find(before + static_cast<std::uint32_t>(n));
     if (renamed[root] == none) {
       renamed[root] = static_cast<std::uint32_t>(open.size());
       open.push_back(0);
     }
-    runs[n].piece = renamed[root];
-    open[runs[n].piece] += static_cast<std::uint64_t>(runs[n].end - runs[n].begin);
+    spans[n].piece = renamed[root];
+    open[spans[n].piece] += static_cast<std::uint64_t>(spans[n].end - spans[n].begin);
   }
   for (std::uint32_t piece = 0; piece < before; ++piece) {
     const std::uint32_t to = renamed[sets.find(piece)];
     if (to == none) {
-      // Earlier pieces can only have been joined by runs of this layer.
+      // Earlier pieces can only have been joined by spans of this layer.
       pieces.closed.push_back(pieces.open[piece]);
     } else {
       open[to] += pieces.open[piece];
     }
   }
-  pieces.runs = std::move(runs);
+  pieces.spans = std::move(spans);
   pieces.rows = std::move(rows);
   pieces.open = std::move(open);
 }

@@ -11,10 +11,10 @@ namespace vdbdither {
 ///
 /// Voxels of a piece are connected by faces, edges and corners (26 neighbours), empty voxels by
 /// faces (6). A cavity is a connected set of empty voxels that does not reach the outside. Two
-/// layers of runs are held in memory.
+/// layers of spans are held in memory.
 class VoxelComponents {
  public:
-  explicit VoxelComponents(const BitFrame& frame);
+  explicit VoxelComponents(const BitLayout& layout);
 
   /// Adds the next layer, above those before.
   void add(const BitLayer& layer);
@@ -28,23 +28,23 @@ class VoxelComponents {
 
  private:
   /// Consecutive voxels of a row, [begin, end), and their piece.
-  struct Run {
+  struct Span {
     int begin, end;
     std::uint32_t piece;
   };
   /// The pieces of one kind of voxels: set or empty.
   struct Pieces {
     bool diagonal = false;              ///< whether edges and corners connect
-    std::vector<Run> runs;              ///< of the last layer
+    std::vector<Span> spans;            ///< of the last layer
     std::vector<std::size_t> rows;      ///< where each row of the last layer begins
     std::vector<std::uint64_t> open;    ///< voxels of the pieces in the last layer, by number
     std::vector<std::uint64_t> closed;  ///< voxels of the pieces that are complete
   };
 
-  void addRuns(Pieces& pieces, std::vector<Run> runs, std::vector<std::size_t> rows) const;
+  void addSpans(Pieces& pieces, std::vector<Span> spans, std::vector<std::size_t> rows) const;
   void addLayer(const BitLayer& layer);
 
-  BitFrame frame_;
+  BitLayout layout_;
   Pieces full_, empty_;
   bool begun_ = false;
 };

@@ -56,8 +56,8 @@ Weights normalized(Weights of) {
 }
 
 /// Returns the correlation with the product of two rows of weights.
-Plane filtered(const Plane& in, const Weights& across, const Weights& along, Beyond beyond) {
-  Plane rows(in.width, in.height);
+Channel filtered(const Channel& in, const Weights& across, const Weights& along, Beyond beyond) {
+  Channel rows(in.width, in.height);
   tbb::parallel_for(0, in.height, [&](int y) {
     const int radius = radiusOf(across);
     for (int x = 0; x < in.width; ++x) {
@@ -68,7 +68,7 @@ Plane filtered(const Plane& in, const Weights& across, const Weights& along, Bey
       rows.at(x, y) = sum;
     }
   });
-  Plane out(in.width, in.height);
+  Channel out(in.width, in.height);
   tbb::parallel_for(0, in.height, [&](int y) {
     const int radius = radiusOf(along);
     for (int i = -radius; i <= radius; ++i) {
@@ -81,8 +81,8 @@ Plane filtered(const Plane& in, const Weights& across, const Weights& along, Bey
 }
 
 template <typename Function>
-Plane combined(const Plane& a, const Plane& b, const Function& function) {
-  Plane out(a.width, a.height);
+Channel combined(const Channel& a, const Channel& b, const Function& function) {
+  Channel out(a.width, a.height);
   for (std::size_t i = 0; i < out.values.size(); ++i)
     out.values[i] = function(a.values[i], b.values[i]);
   return out;
@@ -242,12 +242,12 @@ struct OpponentFilter {
 constexpr std::array<OpponentFilter, 3> opponent_filters{
     {{1, 0.0047, 0, 1e-5}, {1, 0.0053, 0, 1e-5}, {34.1, 0.04, 13.5, 0.025}}};
 
-Plane filtered(const Plane& in, const OpponentFilter& filter, double pixels_per_degree) {
+Channel filtered(const Channel& in, const OpponentFilter& filter, double pixels_per_degree) {
   constexpr double pi = std::numbers::pi;
   constexpr double widest = 0.04;
   const int radius =
       static_cast<int>(std::ceil(3 * std::sqrt(widest / (2 * pi * pi)) * pixels_per_degree));
-  Plane out(in.width, in.height);
+  Channel out(in.width, in.height);
   double total = 0;
   for (const auto& [a, b] : {std::pair(filter.a1, filter.b1), std::pair(filter.a2, filter.b2)}) {
     if (a == 0) continue;
@@ -258,7 +258,7 @@ Plane filtered(const Plane& in, const OpponentFilter& filter, double pixels_per_
     });
     const double height = a * std::sqrt(pi / b);
     total += height * sumOf(row) * sumOf(row);
-    const Plane part = filtered(in, row, row, Beyond::clamped);
+    const Channel part = filtered(in, row, row, Beyond::clamped);
     for (std::size_t i = 0; i < out.values.size(); ++i) out.values[i] += height * part.values[i];
   }
   for (double& value : out.values) value /= total;
@@ -276,7 +276,7 @@ Weights balanced(Weights of) {
 
 /// Returns the magnitude of the first or second derivative of a picture, by Gaussians of the width
 /// of the edges or points that the eye detects.
-Plane feature(const Plane& luminance, double pixels_per_degree, bool points) {
+Channel feature(const Channel& luminance, double pixels_per_degree, bool points) {
   const double sigma = 0.5 * 0.082 * pixels_per_degree;
   const int radius = static_cast<int>(std::ceil(3 * sigma));
   const auto gauss = [&](double i) { return std::exp(-i * i / (2 * sigma * sigma)); };
@@ -290,28 +290,29 @@ Plane feature(const Plane& luminance, double pixels_per_degree, bool points) {
 
 /// A picture as FLIP compares it.
 struct FlipView {
-  std::array<Plane, 3> colour;  ///< Hunt-adjusted CIELAB of the picture as the eye perceives it
-  Plane edges, points;
+  std::array<Channel, 3> colour;  ///< Hunt-adjusted CIELAB of the picture as the eye perceives it
+  Channel edges, points;
 };
 
-FlipView flipView(const ColourPlanes& picture, double pixels_per_degree) {
+FlipView flipView(const ColourChannels& picture, double pixels_per_degree) {
   const int width = picture[0].width;
   const int height = picture[0].height;
   const std::size_t pixels = picture[0].values.size();
-  std::array<Plane, 3> planes{Plane(width, height), Plane(width, height), Plane(width, height)};
+  std::array<Channel, 3> channels{Channel(width, height), Channel(width, height),
+                                  Channel(width, height)};
   for (std::size_t i = 0; i < pixels; ++i) {
     Colour rgb{};
     for (std::size_t n = 0; n < 3; ++n) rgb[n] = linearOfCoded(picture[n].values[i]);
     const Colour coded = opponent(rgb);
-    for (std::size_t n = 0; n < 3; ++n) planes[n].values[i] = coded[n];
+    for (std::size_t n = 0; n < 3; ++n) channels[n].values[i] = coded[n];
   }
   FlipView view;
-  Plane luminance = planes[0];
+  Channel luminance = channels[0];
   for (double& value : luminance.values) value = (value + 16) / 116;
   view.edges = feature(luminance, pixels_per_degree, false);
   view.points = feature(luminance, pixels_per_degree, true);
   for (std::size_t n = 0; n < 3; ++n)
-    view.colour[n] = filtered(planes[n], opponent_filters[n], pixels_per_degree);
+    view.colour[n] = filtered(channels[n], opponent_filters[n], pixels_per_degree);
   for (std::size_t i = 0; i < pixels; ++i) {
     Colour rgb = rgbOfOpponent(
         {view.colour[0].values[i], view.colour[1].values[i], view.colour[2].values[i]});
@@ -324,21 +325,21 @@ FlipView flipView(const ColourPlanes& picture, double pixels_per_degree) {
 
 }  // namespace
 
-Plane structuralSimilarity(const Plane& a, const Plane& b) {
+Channel structuralSimilarity(const Channel& a, const Channel& b) {
   const Weights window =
       normalized(weights(5, [](double i) { return std::exp(-i * i / (2 * 1.5 * 1.5)); }));
-  const auto windowed = [&](const Plane& plane) {
-    return filtered(plane, window, window, Beyond::mirrored);
+  const auto windowed = [&](const Channel& channel) {
+    return filtered(channel, window, window, Beyond::mirrored);
   };
   const auto product = [](double x, double y) { return x * y; };
-  const Plane mean_a = windowed(a);
-  const Plane mean_b = windowed(b);
-  const Plane squares_a = windowed(combined(a, a, product));
-  const Plane squares_b = windowed(combined(b, b, product));
-  const Plane products = windowed(combined(a, b, product));
+  const Channel mean_a = windowed(a);
+  const Channel mean_b = windowed(b);
+  const Channel squares_a = windowed(combined(a, a, product));
+  const Channel squares_b = windowed(combined(b, b, product));
+  const Channel products = windowed(combined(a, b, product));
   constexpr double c1 = 0.01 * 0.01;
   constexpr double c2 = 0.03 * 0.03;
-  Plane map(a.width, a.height);
+  Channel map(a.width, a.height);
   for (std::size_t i = 0; i < map.values.size(); ++i) {
     const double ma = mean_a.values[i];
     const double mb = mean_b.values[i];
@@ -356,7 +357,7 @@ double contrastSensitivity(double cycles_per_degree) {
   return mannosSakrison(cycles_per_degree) / mannosSakrison(peak);
 }
 
-Plane seenByTheEye(const Plane& picture, double pixels_per_degree) {
+Channel seenByTheEye(const Channel& picture, double pixels_per_degree) {
   // A pixel does not affect others beyond two thirds of a degree.
   const int margin = static_cast<int>(std::ceil(pixels_per_degree * 2 / 3));
   const std::size_t width = powerOfTwoFrom(picture.width + 2 * margin);
@@ -382,7 +383,7 @@ Plane seenByTheEye(const Plane& picture, double pixels_per_degree) {
     }
   });
   spectrum.transformed(true);
-  Plane out(picture.width, picture.height);
+  Channel out(picture.width, picture.height);
   for (int y = 0; y < out.height; ++y) {
     for (int x = 0; x < out.width; ++x)
       out.at(x, y) =
@@ -392,8 +393,8 @@ Plane seenByTheEye(const Plane& picture, double pixels_per_degree) {
   return out;
 }
 
-Plane flipDifference(const ColourPlanes& reference, const ColourPlanes& test,
-                     double pixels_per_degree) {
+Channel flipDifference(const ColourChannels& reference, const ColourChannels& test,
+                       double pixels_per_degree) {
   constexpr double colour_exponent = 0.7;
   constexpr double feature_exponent = 0.5;
   constexpr double bend_from = 0.4;
@@ -401,7 +402,7 @@ Plane flipDifference(const ColourPlanes& reference, const ColourPlanes& test,
   const FlipView a = flipView(reference, pixels_per_degree);
   const FlipView b = flipView(test, pixels_per_degree);
   const double maximum = std::pow(hyab(huntLab({0, 1, 0}), huntLab({0, 0, 1})), colour_exponent);
-  Plane map(reference[0].width, reference[0].height);
+  Channel map(reference[0].width, reference[0].height);
   for (std::size_t i = 0; i < map.values.size(); ++i) {
     const auto colourOf = [i](const FlipView& view) {
       return Colour{view.colour[0].values[i], view.colour[1].values[i], view.colour[2].values[i]};

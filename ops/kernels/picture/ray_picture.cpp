@@ -182,7 +182,7 @@ std::array<Vec3d, 3> Camera::axes() const {
   return {right, towards.cross(right), towards};
 }
 
-void frame(Camera& camera, const Mesh& mesh, int margin) {
+void fit(Camera& camera, const Mesh& mesh, int margin) {
   const MeshBounds bounds = boundsOf(mesh);
   camera.target = 0.5 * (bounds.min + bounds.max);
   const auto [right, up, towards] = camera.axes();

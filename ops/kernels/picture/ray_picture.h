@@ -32,7 +32,7 @@ struct Camera {
 /// Sets the picture so that it holds all of `mesh` with a margin of `margin` pixels: the centre
 /// becomes the target, and `left`, `top`, `width` and `height` are set. Throws DataError if the
 /// mesh reaches the eye, or if the picture would be larger than 16384 pixels.
-void frame(Camera& camera, const Mesh& mesh, int margin);
+void fit(Camera& camera, const Mesh& mesh, int margin);
 
 /// The lights of a picture. An unobstructed horizontal surface gets the same irradiance from each.
 enum class Look {

@@ -227,12 +227,12 @@ class StripTransform {
       const int y = column % edge;
       const std::uint64_t byte = bits[x] >> (edge * y);
       std::array<int, edge> steps;
-      int run = below[column];
-      for (int z = 0; z < edge; ++z) steps[z] = run = byte >> z & 1 ? run + 1 : 0;
-      run = above[column];
+      int span = below[column];
+      for (int z = 0; z < edge; ++z) steps[z] = span = byte >> z & 1 ? span + 1 : 0;
+      span = above[column];
       for (int z = edge - 1; z >= 0; --z) {
-        run = byte >> z & 1 ? run + 1 : 0;
-        steps[z] = std::min(steps[z], run);
+        span = byte >> z & 1 ? span + 1 : 0;
+        steps[z] = std::min(steps[z], span);
         const bool within = steps[z] <= reach(2);
         block.squares[y * plane + x * edge + z] = within ? squares_[2][steps[z]] : infinite;
         if (within) block.state = Block::State::mixed;

@@ -51,9 +51,9 @@ enum class Content : std::uint8_t { unknown = 0, empty = 1, full = 2, mixed = 3 
 class Occupancy {
  public:
   Occupancy(const openvdb::BoolGrid& solid, const CoordBBox& box, ZRange valid)
-      : frame_(box), box_(box), valid_(valid), layers_(bitLayers(solid, frame_, valid)) {
+      : layout_(box), box_(box), valid_(valid), layers_(bitLayers(solid, layout_, valid)) {
     // One empty leaf on every side.
-    first_leaf_ = Coord(frame_.xBegin() - leaf_layers, (box.min().y() & ~7) - leaf_layers,
+    first_leaf_ = Coord(layout_.xBegin() - leaf_layers, (box.min().y() & ~7) - leaf_layers,
                         alignedToLeaves(valid).begin - leaf_layers);
     leaves_ = Coord((box.max().x() - first_leaf_.x()) / leaf_layers + 2,
                     (box.max().y() - first_leaf_.y()) / leaf_layers + 2,
@@ -71,13 +71,13 @@ class Occupancy {
 
   /// Returns eight bits from x on, a multiple of 8.
   [[nodiscard]] std::uint8_t byte(int x, int y, int z) const {
-    const int row = y - frame_.yBegin();
-    const int at = x - frame_.xBegin();
-    if (!valid_.contains(z) || row < 0 || row >= frame_.rows() || at < 0 ||
-        at >= frame_.words() * 64)
+    const int row = y - layout_.yBegin();
+    const int at = x - layout_.xBegin();
+    if (!valid_.contains(z) || row < 0 || row >= layout_.rows() || at < 0 ||
+        at >= layout_.words() * 64)
       return 0;
     const std::uint64_t word = layers_[static_cast<std::size_t>(z - valid_.begin)]
-                                      [frame_.row(row) + static_cast<std::size_t>(at / 64)];
+                                      [layout_.row(row) + static_cast<std::size_t>(at / 64)];
     return static_cast<std::uint8_t>(word >> (at % 64));
   }
 
@@ -141,7 +141,7 @@ class Occupancy {
     return static_cast<Content>(seen);
   }
 
-  BitFrame frame_;
+  BitLayout layout_;
   CoordBBox box_;
   ZRange valid_;
   std::vector<BitLayer> layers_;

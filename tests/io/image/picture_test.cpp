@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "io/file/staged_output.h"
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 #include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"

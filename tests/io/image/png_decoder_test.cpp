@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/image/png_runs.h"
-#include "tests/support/run_images.h"
+#include "io/image/png_spans.h"
+#include "tests/support/span_images.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -16,13 +16,13 @@ using testing::ThrowsMessage;
 const std::vector<std::uint32_t> colours = {rgba(0, 0, 0, 0), rgba(240, 10, 20, 255),
                                             rgba(1, 2, 3, 4)};
 
-RunImage image() {
-  return test::runImage(37, 21,
-                        [](int x, int y) { return static_cast<std::uint32_t>((x / 3 + y) % 3); });
+SpanImage image() {
+  return test::spanImage(37, 21,
+                         [](int x, int y) { return static_cast<std::uint32_t>((x / 3 + y) % 3); });
 }
 
-RunImage mapped(RunImage picture, const std::vector<std::uint32_t>& palette) {
-  for (Run& run : picture.runs) run.value = palette[run.value];
+SpanImage mapped(SpanImage picture, const std::vector<std::uint32_t>& palette) {
+  for (Span& span : picture.spans) span.value = palette[span.value];
   return picture;
 }
 
@@ -36,7 +36,7 @@ TEST(PngDecoder, GreyAndBitsComeAsOpaqueColours) {
   EXPECT_EQ(decodePng(encodePng(image(), {PngPixels::grey8, greys, 0, 0})),
             mapped(image(), {rgba(0, 0, 0), rgba(255, 255, 255), rgba(99, 99, 99)}));
   const auto bits =
-      test::runImage(11, 5, [](int x, int y) { return static_cast<std::uint32_t>((x + y) % 2); });
+      test::spanImage(11, 5, [](int x, int y) { return static_cast<std::uint32_t>((x + y) % 2); });
   EXPECT_EQ(decodePng(encodePng(bits, {PngPixels::grey1, {}, 0, 0})),
             mapped(bits, {rgba(0, 0, 0), rgba(255, 255, 255)}));
 }

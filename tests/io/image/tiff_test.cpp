@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "io/file/staged_output.h"
-#include "io/image/png_runs.h"
-#include "tests/support/run_images.h"
+#include "io/image/png_spans.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/span_images.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -23,7 +23,7 @@ std::uint32_t stripes(int x, int y) { return static_cast<std::uint32_t>((x / 3 +
 
 TEST(Tiff, PalettesKeepIndicesAndColours) {
   const test::ScratchFolder scratch;
-  const auto bytes = encodeTiff(test::runImage(37, 70, stripes), {palette, 0.042, 0.084});
+  const auto bytes = encodeTiff(test::spanImage(37, 70, stripes), {palette, 0.042, 0.084});
   writeFile(scratch / "a.tif", bytes, "a.tif");
   TIFF* tiff = TIFFOpen((scratch / "a.tif").c_str(), "r");
   ASSERT_NE(tiff, nullptr);
@@ -37,7 +37,7 @@ TEST(Tiff, PalettesKeepIndicesAndColours) {
     for (int x = 0; x < 37; ++x)
       ASSERT_EQ(raster[y * 37 + x], palette[stripes(x, y)]) << x << " " << y;
   }
-  EXPECT_EQ(decodeTiff(bytes), test::runImage(37, 70, stripes));
+  EXPECT_EQ(decodeTiff(bytes), test::spanImage(37, 70, stripes));
 }
 
 TEST(Tiff, BitsComeBack) {
@@ -45,7 +45,7 @@ TEST(Tiff, BitsComeBack) {
     const auto bit = [](int x, int y) {
       return static_cast<std::uint32_t>((x * x + 3 * y) % 5 < 2);
     };
-    const RunImage image = test::runImage(width, 20, bit);
+    const SpanImage image = test::spanImage(width, 20, bit);
     const auto bytes = encodeTiff(image, {{}, 1, 1});
     EXPECT_EQ(decodeTiff(bytes), image) << width;
     EXPECT_EQ(bytes, encodeTiff(image, {{}, 1, 1}));
@@ -53,7 +53,7 @@ TEST(Tiff, BitsComeBack) {
 }
 
 TEST(Tiff, RefusesWhatItCannotReadOrWrite) {
-  auto bytes = encodeTiff(test::runImage(37, 70, stripes), {palette, 1, 1});
+  auto bytes = encodeTiff(test::spanImage(37, 70, stripes), {palette, 1, 1});
   const std::vector<std::uint8_t> text = {'n', 'o', 'n', 'e'};
   EXPECT_THAT([&] { decodeTiff(text); },
               ThrowsMessage<DataError>(HasSubstr("is no readable TIFF: ")));
@@ -64,13 +64,13 @@ TEST(Tiff, RefusesWhatItCannotReadOrWrite) {
   }
   EXPECT_THAT(
       [&] {
-        encodeTiff(RunImage{}, {palette, 1, 1});
+        encodeTiff(SpanImage{}, {palette, 1, 1});
       },
       ThrowsMessage<DataError>("an image without pixels is no TIFF"));
   const std::vector<std::uint32_t> many(257);
   EXPECT_THAT(
       [&] {
-        encodeTiff(test::runImage(2, 2, stripes), {many, 1, 1});
+        encodeTiff(test::spanImage(2, 2, stripes), {many, 1, 1});
       },
       ThrowsMessage<DataError>("a TIFF has at most 256 colours"));
 }

@@ -20,7 +20,7 @@ Manifest example() {
   manifest.printer = R"({"name":"mine","pitch_mm":[0.5,1.0,0.25]})";
   manifest.history = {"mesh2sdf part.stl", "dither"};
   manifest.lattice = {{0.5, 1, 0.25}, {0, 0.125, 0}, {Coord(-1, 0, 4), Coord(2, 1, 9)}};
-  manifest.frame = {manifest.lattice.box, 1, false, true};
+  manifest.layout = {manifest.lattice.box, 1, false, true};
   manifest.background = {1, 2, 3, 0};
   manifest.materials = {{"white", {240, 240, 240, 255}}, {"black", {26, 26, 29, 255}}};
   manifest.voxels = {8, 0};
@@ -172,7 +172,7 @@ TEST(Manifest, RefusesWhatDoesNotFitTogether) {
   const auto misfit = ThrowsMessage<DataError>(
       HasSubstr("box, padding and layers do not fit together; make the stack again"));
   Manifest narrow = example();
-  narrow.frame.padding = -1;
+  narrow.layout.padding = -1;
   EXPECT_THAT(reading(narrow), misfit);
   for (const ZRange layers : {ZRange{4, 4}, ZRange{3, 5}, ZRange{9, 11}}) {
     Manifest off = example();

@@ -9,8 +9,8 @@
 
 #include "io/stack/stack_reader.h"
 #include "io/stack/stack_writer.h"
-#include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/span_images.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -33,7 +33,7 @@ class SliceFormats : public testing::TestWithParam<const SliceFormat*> {
     stack.lattice = {{0.042, 0.084, 0.022},
                      {0, 0, 0},
                      CoordBBox(Coord(0, 0, layers.begin), Coord(18, 10, layers.end - 1))};
-    stack.frame = {stack.lattice.box, 0, false, false};
+    stack.layout = {stack.lattice.box, 0, false, false};
     stack.background = {0, 0, 0, 255};
     stack.materials = {
         {"white", {240, 240, 240, 255}}, {"black", {26, 26, 29, 255}}, {"red", {255, 0, 0, 255}}};
@@ -42,8 +42,8 @@ class SliceFormats : public testing::TestWithParam<const SliceFormat*> {
 
   /// A layer with voxels of all three materials and empty ones.
   /// @param most  the maximum of its values
-  [[nodiscard]] static RunImage image(int z, std::uint32_t most = 3) {
-    return test::runImage(19, 11, [&](int x, int y) {
+  [[nodiscard]] static SpanImage image(int z, std::uint32_t most = 3) {
+    return test::spanImage(19, 11, [&](int x, int y) {
       const int value = x * x + y * y > 200 ? 0 : (x / 3 + y / 2 + z * z) % 4;
       return std::min(static_cast<std::uint32_t>(value), most);
     });
@@ -57,7 +57,7 @@ class SliceFormats : public testing::TestWithParam<const SliceFormat*> {
     StackWriter writer(target, stack, {"s", 3, 7}, *encoder, false);
     for (int z = layers.begin; z < layers.end; z += 5) {
       const ZRange piece = intersection({z, z + 5}, layers);
-      std::vector<RunImage> images;
+      std::vector<SpanImage> images;
       for (int layer = piece.begin; layer < piece.end; ++layer) images.push_back(image(layer));
       writer.add(piece, images, {});
     }
@@ -77,7 +77,7 @@ TEST_P(SliceFormats, ReadsBackWhatItWrites) {
     EXPECT_EQ(reader.manifest().layers, layers);
     for (int z = layers.begin; z < layers.end; ++z) {
       const bool tells_materials = GetParam()->pixel != SlicePixel::printed;
-      const RunImage expected = image(z, tells_materials ? 3 : 1);
+      const SpanImage expected = image(z, tells_materials ? 3 : 1);
       EXPECT_TRUE(reader.layer(z) == expected) << z;
     }
     EXPECT_THAT(warnings, IsEmpty());
@@ -103,9 +103,9 @@ Manifest writeCropped(const std::filesystem::path& target, const Manifest& stack
   StackWriter writer(target, stack, {"s", 3, 7}, encoder, keep_blank);
   for (int z = given.begin; z < given.end; z += 5) {
     const ZRange piece = intersection({z, z + 5}, given);
-    std::vector<RunImage> images;
+    std::vector<SpanImage> images;
     for (int layer = piece.begin; layer < piece.end; ++layer) {
-      images.push_back(test::runImage(19, 11, [&](int x, int) {
+      images.push_back(test::spanImage(19, 11, [&](int x, int) {
         return std::uint32_t{printed.contains(layer) && layer % 2 == 0 && x == 3};
       }));
     }
@@ -185,7 +185,7 @@ TEST(StackReader, RefusesAFormatThatIsNotInTheTable) {
   Manifest stack;
   stack.format = "jpeg";
   stack.lattice.box = CoordBBox(Coord(0), Coord(1));
-  stack.frame.box = stack.lattice.box;
+  stack.layout.box = stack.lattice.box;
   stack.layers = stack.lattice.layers();
   scratch.write("manifest.json", textOf(stack));
   EXPECT_THAT(

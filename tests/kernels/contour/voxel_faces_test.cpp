@@ -19,7 +19,7 @@ Mesh facesOf(const BoolGrid& grid, const Lattice& lattice) {
   VoxelFaces faces(lattice);
   Mesh mesh;
   int z = lattice.box.min().z();
-  for (BitLayer& layer : bitLayers(grid, faces.frame(), {z, lattice.box.max().z() + 1}))
+  for (BitLayer& layer : bitLayers(grid, faces.layout(), {z, lattice.box.max().z() + 1}))
     append(mesh, faces.add(std::move(layer), z++));
   append(mesh, faces.finish());
   return mesh;

@@ -281,7 +281,7 @@ TEST(MeshDistance, SlabsOfAnyHeightGiveTheWhole) {
     const MeshDistance field(mesh, lattice, band);
     const DistanceGrids whole = field.run(lattice.layers());
     for (const int height : {8, 16, 40}) {
-      std::vector<Layers> pieces;
+      std::vector<GridLayers> pieces;
       const ZRange all = alignedToLeaves(lattice.layers());
       for (const ZRange range : test::slabsOf(all, height))
         pieces.push_back({field.run(range).surface, range});

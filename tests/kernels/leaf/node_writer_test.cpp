@@ -13,7 +13,7 @@ using openvdb::Coord;
 using openvdb::FloatTree;
 using Writer = NodeWriter<FloatTree>;
 
-TEST(NodeWriter, AddsLeavesAndRunsOfTilesAcrossNodes) {
+TEST(NodeWriter, AddsLeavesAndSpansOfTilesAcrossNodes) {
   FloatTree tree(1.0F);
   for (const Coord& origin : {Coord(-8, 0, 0), Coord(0, 0, 0)}) Writer::makeParent(tree, origin);
   Writer writer(tree);

@@ -19,9 +19,9 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 
 VoxelComponents::Counts countsOf(const BoolGrid& grid, const CoordBBox& box) {
-  const BitFrame frame(box);
-  VoxelComponents components(frame);
-  for (const BitLayer& layer : bitLayers(grid, frame, {box.min().z(), box.max().z() + 1}))
+  const BitLayout layout(box);
+  VoxelComponents components(layout);
+  for (const BitLayer& layer : bitLayers(grid, layout, {box.min().z(), box.max().z() + 1}))
     components.add(layer);
   return components.finish();
 }
@@ -78,7 +78,7 @@ TEST(VoxelComponents, CountsAsAFloodFillDoes) {
 
 TEST(VoxelComponents, OfNothingThereAreNone) {
   EXPECT_THAT(countsOf({{"..."}}).components, IsEmpty());
-  EXPECT_THAT(VoxelComponents(BitFrame(CoordBBox(Coord(0), Coord(3)))).finish().cavities,
+  EXPECT_THAT(VoxelComponents(BitLayout(CoordBBox(Coord(0), Coord(3)))).finish().cavities,
               IsEmpty());
 }
 

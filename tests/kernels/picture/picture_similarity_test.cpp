@@ -9,13 +9,13 @@ namespace vdbdither {
 namespace {
 
 /// Values from 0 to 1 by a fixed recipe.
-Plane drawn(int width, int height, int a, int b, int modulus, int offset = 0) {
-  Plane plane(width, height);
+Channel drawn(int width, int height, int a, int b, int modulus, int offset = 0) {
+  Channel channel(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x)
-      plane.at(x, y) = (x * a + y * b + offset) % modulus / (modulus - 1.0);
+      channel.at(x, y) = (x * a + y * b + offset) % modulus / (modulus - 1.0);
   }
-  return plane;
+  return channel;
 }
 
 int mirrored(int i, int size) {
@@ -24,7 +24,7 @@ int mirrored(int i, int size) {
 }
 
 /// The definition, window by window.
-double similarityAt(const Plane& a, const Plane& b, int x, int y) {
+double similarityAt(const Channel& a, const Channel& b, int x, int y) {
   double weights = 0, mean_a = 0, mean_b = 0;
   const auto visit = [&](const auto& with) {
     for (int j = -5; j <= 5; ++j) {
@@ -53,9 +53,9 @@ double similarityAt(const Plane& a, const Plane& b, int x, int y) {
 }
 
 TEST(StructuralSimilarity, IsTheDefinitionAtEveryPixel) {
-  const Plane a = drawn(17, 12, 37, 59, 101);
-  const Plane b = drawn(17, 12, 29, 43, 97);
-  const Plane map = structuralSimilarity(a, b);
+  const Channel a = drawn(17, 12, 37, 59, 101);
+  const Channel b = drawn(17, 12, 29, 43, 97);
+  const Channel map = structuralSimilarity(a, b);
   for (int y = 0; y < map.height; ++y) {
     for (int x = 0; x < map.width; ++x)
       EXPECT_NEAR(map.at(x, y), similarityAt(a, b, x, y), 1e-12) << x << " " << y;
@@ -63,8 +63,8 @@ TEST(StructuralSimilarity, IsTheDefinitionAtEveryPixel) {
 }
 
 TEST(StructuralSimilarity, IsOneForTheSameAndBelowZeroForTheNegative) {
-  const Plane a = drawn(20, 15, 37, 59, 101);
-  Plane negative = a;
+  const Channel a = drawn(20, 15, 37, 59, 101);
+  Channel negative = a;
   for (double& value : negative.values) value = 1 - value;
   for (const double value : structuralSimilarity(a, a).values) EXPECT_NEAR(value, 1, 1e-12);
   for (const double value : structuralSimilarity(a, negative).values) EXPECT_LT(value, 0);
@@ -86,42 +86,42 @@ TEST(ContrastSensitivity, FallsFromTheMostVisibleFrequencyAsMannosAndSakrisonMea
 
 TEST(SeenByTheEye, AGratingKeepsItsShareAndAPlainGreyAllOfIt) {
   for (const int period : {4, 8, 16}) {
-    Plane grating(192, 160);
+    Channel grating(192, 160);
     for (int y = 0; y < grating.height; ++y) {
       for (int x = 0; x < grating.width; ++x)
         grating.at(x, y) = 0.5 + 0.4 * std::cos(2 * std::numbers::pi * (x + 0.5) / period);
     }
     const double share = contrastSensitivity(100.0 / period);
-    const Plane seen = seenByTheEye(grating, 100);
+    const Channel seen = seenByTheEye(grating, 100);
     for (int y = 0; y < grating.height; y += 7) {
       for (int x = 0; x < grating.width; ++x)
         EXPECT_NEAR(seen.at(x, y), 0.5 + share * (grating.at(x, y) - 0.5), 4e-3) << period;
     }
   }
-  for (const double value : seenByTheEye(Plane(33, 20, 0.3), 60).values)
+  for (const double value : seenByTheEye(Channel(33, 20, 0.3), 60).values)
     EXPECT_NEAR(value, 0.3, 1e-12);
 }
 
-ColourPlanes plain(double value) {
-  return {Plane(12, 9, value), Plane(12, 9, value), Plane(12, 9, value)};
+ColourChannels plain(double value) {
+  return {Channel(12, 9, value), Channel(12, 9, value), Channel(12, 9, value)};
 }
 
-double meanOf(const Plane& plane) {
+double meanOf(const Channel& channel) {
   double sum = 0;
-  for (const double value : plane.values) sum += value;
-  return sum / static_cast<double>(plane.values.size());
+  for (const double value : channel.values) sum += value;
+  return sum / static_cast<double>(channel.values.size());
 }
 
 /// The expected values are what NVIDIA's FLIP 1.7 (single precision) says of the same pictures.
 TEST(FlipDifference, IsWhatThePublishedProgramSays) {
-  ColourPlanes a, b;
+  ColourChannels a, b;
   for (int channel = 0; channel < 3; ++channel) {
     a[static_cast<std::size_t>(channel)] = drawn(12, 9, 37, 59, 101, 83 * channel);
     b[static_cast<std::size_t>(channel)] = drawn(12, 9, 29, 43, 97, 71 * channel);
   }
   EXPECT_NEAR(meanOf(flipDifference(a, b, 67)), 0.342007, 2e-5);
   EXPECT_NEAR(meanOf(flipDifference(a, b, 30)), 0.686252, 2e-5);
-  const Plane map = flipDifference(a, b, 100);
+  const Channel map = flipDifference(a, b, 100);
   EXPECT_NEAR(meanOf(map), 0.277647, 2e-5);
   EXPECT_NEAR(map.at(0, 0), 0.59955925, 1e-4);
   EXPECT_NEAR(map.at(6, 4), 0.29421473, 1e-4);

@@ -26,7 +26,7 @@ Camera fromAbove(const Mesh& mesh, double pixel_mm, double distance_mm = 0) {
   camera.elevation_degrees = 90;
   camera.pixel_mm = pixel_mm;
   camera.distance_mm = distance_mm;
-  frame(camera, mesh, 2);
+  fit(camera, mesh, 2);
   return camera;
 }
 
@@ -66,7 +66,7 @@ TEST(RayPicture, WhatLiesInAShadowGetsNoneOfTheLamp) {
   Camera camera = fromAbove(mesh, 0.1);
   camera.azimuth_degrees = 0;
   camera.elevation_degrees = 30;
-  frame(camera, mesh, 2);
+  fit(camera, mesh, 2);
   const RayPicture picture = RayScene(mesh).picture(camera, Look::area, 64, 0, ignore);
   // The plate's upper face, 0.6 mm below the middle of all, where y is -2.
   const double up = -0.6 * std::cos(std::numbers::pi / 6) - 2 * 0.5;
@@ -99,10 +99,10 @@ TEST(RayPicture, TheAzimuthTurnsTheEyeToTheRight) {
   const Mesh box = test::boxMesh({0, 0, 0}, {1, 2, 3});
   Camera camera;
   camera.pixel_mm = 0.5;
-  frame(camera, box, 0);
+  fit(camera, box, 0);
   EXPECT_EQ(std::pair(camera.width, camera.height), std::pair(2, 6));
   camera.azimuth_degrees = 90;
-  frame(camera, box, 0);
+  fit(camera, box, 0);
   EXPECT_EQ(std::pair(camera.width, camera.height), std::pair(4, 6));
   EXPECT_NEAR(camera.axes()[2].x(), 1, 1e-12);
 }
@@ -113,7 +113,7 @@ TEST(RayPicture, ThreadsChangeNoBit) {
   Camera camera = fromAbove(ball, 0.05);
   camera.elevation_degrees = 40;
   camera.distance_mm = 100;
-  frame(camera, ball, 2);
+  fit(camera, ball, 2);
   const auto draw = [&](int threads) {
     RayPicture picture;
     tbb::task_arena(threads).execute(

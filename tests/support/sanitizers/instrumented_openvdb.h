@@ -1,8 +1,8 @@
 #pragma once
 
-// Included before all else where ThreadSanitizer builds: OpenVDB's tools are then compiled from
-// their headers, with its instruments. libopenvdb.so has none, so that loops which it holds
-// compiled end unseen, and what one of their threads did seems to race with what comes after.
+// Included first in builds with ThreadSanitizer. OpenVDB's tools are then compiled from their
+// headers, with instrumentation. libopenvdb.so has none: ThreadSanitizer does not see the end of
+// its loops and would report races between their threads and later code.
 
 #include <openvdb/version.h>
 

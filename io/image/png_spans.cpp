@@ -1,10 +1,10 @@
-// PNG (third edition) with a deflate stream made from runs. A row is a filter byte (none) and runs
-// of units (a pixel, or a byte of pixels). Long runs are matches at the distance of a unit, which
-// cost two bits for 258 bytes; what agrees with the row above is a match at the distance of a row;
-// what starts a run otherwise is looked up among the runs before it, by the next six, three and one
-// of them.
+// PNG (third edition) with a deflate stream made from spans. A row is a filter byte (none) and
+// spans of units (a pixel, or a byte of pixels). Long spans are matches at the distance of a unit,
+// which cost two bits for 258 bytes; what agrees with the row above is a match at the distance of a
+// row; what starts a span otherwise is looked up among the spans before it, by the next six, three
+// and one of them.
 
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 
 #include <algorithm>
 #include <array>
@@ -23,9 +23,9 @@ namespace {
 
 constexpr std::uint32_t adler_modulus = 65521;
 
-class RunDeflater {
+class SpanDeflater {
  public:
-  RunDeflater(const RunImage& image, const PngFormat& format, std::vector<std::uint8_t>& out)
+  SpanDeflater(const SpanImage& image, const PngFormat& format, std::vector<std::uint8_t>& out)
       : image_(image),
         format_(format),
         unit_(format.pixels == PngPixels::rgba8 ? 4 : 1),
@@ -34,13 +34,13 @@ class RunDeflater {
         stride_(1 + unit_ * units_),
         deflate_(out) {
     for (auto& table : seen_) table.assign(table_size, {});
-    runs_.reserve(image.runs.size());
+    spans_.reserve(image.spans.size());
   }
 
   /// Writes every row and returns the Adler-32 of their bytes.
   std::uint32_t run() {
     for (std::uint32_t y = 0; y < image_.height; ++y) {
-      row_begin_ = runs_.size();
+      row_begin_ = spans_.size();
       loadRow(y);
       addToAdler();
       encodeRow(y);
@@ -52,28 +52,30 @@ class RunDeflater {
   }
 
  private:
-  /// Where a run began that started with the same runs.
+  /// Where a span began that started with the same spans.
   struct Seen {
     std::uint64_t position = 0;  ///< in the stream, bytes; 0: none (a filter byte)
-    std::uint32_t index = 0;     ///< in runs_
+    std::uint32_t index = 0;     ///< in spans_
   };
   static constexpr int orders = 3;
   static constexpr std::size_t table_size = 4096;
 
-  [[nodiscard]] std::uint32_t begin(std::size_t run) const {
-    return run == 0 || runs_[run - 1].end == units_ ? 0 : runs_[run - 1].end;
+  [[nodiscard]] std::uint32_t begin(std::size_t span) const {
+    return span == 0 || spans_[span - 1].end == units_ ? 0 : spans_[span - 1].end;
   }
-  [[nodiscard]] std::uint32_t lengthOf(std::size_t run) const {
-    return runs_[run].end - begin(run);
+  [[nodiscard]] std::uint32_t lengthOf(std::size_t span) const {
+    return spans_[span].end - begin(span);
   }
-  [[nodiscard]] std::uint64_t beginByte(std::size_t run) const { return 1 + unit_ * begin(run); }
-  [[nodiscard]] std::uint64_t endByte(std::size_t run) const { return 1 + unit_ * runs_[run].end; }
+  [[nodiscard]] std::uint64_t beginByte(std::size_t span) const { return 1 + unit_ * begin(span); }
+  [[nodiscard]] std::uint64_t endByte(std::size_t span) const {
+    return 1 + unit_ * spans_[span].end;
+  }
 
   void append(std::uint32_t end, std::uint32_t value) {
-    if (runs_.size() > row_begin_ && runs_.back().value == value) {
-      runs_.back().end = end;
+    if (spans_.size() > row_begin_ && spans_.back().value == value) {
+      spans_.back().end = end;
     } else {
-      runs_.push_back({end, value});
+      spans_.push_back({end, value});
     }
   }
 
@@ -82,7 +84,7 @@ class RunDeflater {
       return format_.palette.empty() ? value : format_.palette[value];
     };
     if (format_.pixels != PngPixels::grey1) {
-      for (const Run& run : image_.row(y)) append(run.end, pixel(run.value));
+      for (const Span& span : image_.row(y)) append(span.end, pixel(span.value));
     } else {
       packRow(y, pixel);
     }
@@ -93,34 +95,34 @@ class RunDeflater {
   void packRow(std::uint32_t y, const Pixel& pixel) {
     std::uint32_t x = 0;
     std::uint32_t byte = 0;
-    for (const Run& run : image_.row(y)) {
-      const std::uint32_t ones = pixel(run.value) ? 255 : 0;
+    for (const Span& span : image_.row(y)) {
+      const std::uint32_t ones = pixel(span.value) ? 255 : 0;
       const auto bits = [ones](std::uint32_t from, std::uint32_t to) {
         return ones & (255U >> from) & ~(255U >> to);
       };
       if (x % 8) {
-        const std::uint32_t end = std::min(run.end, (x | 7) + 1);
+        const std::uint32_t end = std::min(span.end, (x | 7) + 1);
         byte |= bits(x % 8, end - x / 8 * 8);
         x = end;
         if (x % 8) continue;
         append(x / 8, byte);
       }
-      if (run.end / 8 > x / 8) append(run.end / 8, ones);
-      byte = bits(0, run.end % 8);
-      x = run.end;
+      if (span.end / 8 > x / 8) append(span.end / 8, ones);
+      byte = bits(0, span.end % 8);
+      x = span.end;
     }
     if (x % 8) append(x / 8 + 1, byte);
   }
 
-  /// In closed form: a run of n units with byte sum S and Σ j·byte_j = J, r bytes before the row's
+  /// In closed form: a span of n units with byte sum S and Σ j·byte_j = J, r bytes before the row's
   /// end, adds n·S to the one sum and S·(n·r − unit·n(n−1)/2) − n·J to the other.
   void addToAdler() {
     std::uint64_t row_sum = 0;
     std::uint64_t row_weighted = 0;
     std::uint64_t begin = 0;
-    for (std::size_t i = row_begin_; i < runs_.size(); ++i) {
-      const std::uint32_t value = runs_[i].value;
-      const std::uint64_t count = runs_[i].end - begin;
+    for (std::size_t i = row_begin_; i < spans_.size(); ++i) {
+      const std::uint32_t value = spans_[i].value;
+      const std::uint64_t count = spans_[i].end - begin;
       const std::uint64_t rest = unit_ * (units_ - begin);
       std::uint64_t sum = value & 255;
       std::uint64_t moment = 0;
@@ -131,24 +133,24 @@ class RunDeflater {
       }
       row_sum += count * sum;
       row_weighted += sum * (count * rest - unit_ * (count * (count - 1) / 2)) - count * moment;
-      begin = runs_[i].end;
+      begin = spans_[i].end;
     }
     weighted_sum_ = static_cast<std::uint32_t>(
         (weighted_sum_ + stride_ % adler_modulus * sum_ + row_weighted) % adler_modulus);
     sum_ = static_cast<std::uint32_t>((sum_ + row_sum) % adler_modulus);
   }
 
-  /// Hashes of the runs that start at each run of the row.
+  /// Hashes of the spans that start at each span of the row.
   void hashRow() {
-    const std::size_t size = runs_.size() - row_begin_;
+    const std::size_t size = spans_.size() - row_begin_;
     for (auto& hash : hash_) hash.resize(size);
     std::array<std::uint64_t, 6> ahead{};
     for (std::size_t i = size; i-- > 0;) {
-      const Run& run = runs_[row_begin_ + i];
+      const Span& span = spans_[row_begin_ + i];
       const std::uint32_t length = lengthOf(row_begin_ + i);
       std::copy_backward(ahead.begin(), ahead.end() - 1, ahead.end());
-      ahead[0] = (run.value + 0x9e3779b97f4a7c15U * length) * 0xbf58476d1ce4e5b9U;
-      std::uint64_t hash = run.value * 0x94d049bb133111ebU;
+      ahead[0] = (span.value + 0x9e3779b97f4a7c15U * length) * 0xbf58476d1ce4e5b9U;
+      std::uint64_t hash = span.value * 0x94d049bb133111ebU;
       hash_[2][i] = slot(hash);
       for (int j = 0; j < 3; ++j) hash = std::rotl(hash, 23) + ahead[j];
       hash_[1][i] = slot(hash * 0x9e3779b97f4a7c15U);
@@ -159,36 +161,36 @@ class RunDeflater {
   static std::uint16_t slot(std::uint64_t hash) { return static_cast<std::uint16_t>(hash >> 52); }
 
   /// How many bytes from `byte` of the row agree with the row above, looking no further than a
-  /// match reaches. `run` and `above` are the runs at that byte.
-  [[nodiscard]] std::uint64_t agreement(std::uint64_t byte, std::size_t run,
+  /// match reaches. `span` and `above` are the spans at that byte.
+  [[nodiscard]] std::uint64_t agreement(std::uint64_t byte, std::size_t span,
                                         std::size_t above) const {
     const std::uint64_t enough = byte + DeflateWriter::max_match;
     std::uint64_t end = byte ? byte : 1;
-    while (end < stride_ && end < enough && runs_[run].value == runs_[above].value) {
-      const std::uint32_t run_end = runs_[run].end;
-      const std::uint32_t above_end = runs_[above].end;
-      end = 1 + unit_ * std::uint64_t{std::min(run_end, above_end)};
-      run += run_end <= above_end;
-      above += above_end <= run_end;
+    while (end < stride_ && end < enough && spans_[span].value == spans_[above].value) {
+      const std::uint32_t span_end = spans_[span].end;
+      const std::uint32_t above_end = spans_[above].end;
+      end = 1 + unit_ * std::uint64_t{std::min(span_end, above_end)};
+      span += span_end <= above_end;
+      above += above_end <= span_end;
     }
     return std::min(end, enough) - byte;
   }
 
-  /// The same for the runs that start at `from`, anywhere above, and at `to` in this row.
-  [[nodiscard]] std::uint64_t agreementOfRuns(std::size_t from, std::size_t to) const {
+  /// The same for the spans that start at `from`, anywhere above, and at `to` in this row.
+  [[nodiscard]] std::uint64_t agreementOfSpans(std::size_t from, std::size_t to) const {
     std::uint64_t bytes = 0;
-    for (; runs_[from].value == runs_[to].value; ++from, ++to) {
+    for (; spans_[from].value == spans_[to].value; ++from, ++to) {
       const std::uint32_t from_length = lengthOf(from);
       const std::uint32_t to_length = lengthOf(to);
       bytes += unit_ * std::uint64_t{std::min(from_length, to_length)};
-      const bool row_ends = runs_[from].end == units_ || runs_[to].end == units_;
+      const bool row_ends = spans_[from].end == units_ || spans_[to].end == units_;
       if (from_length != to_length || row_ends || bytes >= DeflateWriter::max_match) break;
     }
     return std::min<std::uint64_t>(bytes, DeflateWriter::max_match);
   }
 
-  void insertUpTo(std::size_t run, std::uint64_t row_position) {
-    for (; inserted_ < run; ++inserted_) {
+  void insertUpTo(std::size_t span, std::uint64_t row_position) {
+    for (; inserted_ < span; ++inserted_) {
       const Seen here{row_position + beginByte(inserted_), static_cast<std::uint32_t>(inserted_)};
       for (int order = 0; order < orders; ++order) {
         seen_[order][hash_[order][inserted_ - row_begin_]] = here;
@@ -199,18 +201,18 @@ class RunDeflater {
   void encodeRow(std::uint32_t y);
   void closeMatch();
 
-  const RunImage& image_;
+  const SpanImage& image_;
   const PngFormat& format_;
-  const std::uint64_t unit_;    ///< bytes that repeat in a run
+  const std::uint64_t unit_;    ///< bytes that repeat in a span
   const std::uint64_t units_;   ///< in a row
   const std::uint64_t stride_;  ///< bytes of a row
   DeflateWriter deflate_;
 
-  std::vector<Run> runs_;  ///< of all rows so far, in units
+  std::vector<Span> spans_;  ///< of all rows so far, in units
   std::size_t row_begin_ = 0;
   std::size_t above_begin_ = 0;
-  std::size_t inserted_ = 0;                             ///< runs before this one are in seen_
-  std::array<std::vector<std::uint16_t>, orders> hash_;  ///< per order and run of the row
+  std::size_t inserted_ = 0;                             ///< spans before this one are in seen_
+  std::array<std::vector<std::uint16_t>, orders> hash_;  ///< per order and span of the row
   std::array<std::vector<Seen>, orders> seen_;           ///< per order, by hash
   std::uint32_t open_match_ =
       0;  ///< bytes so far of a match with the row above that goes on in the next row
@@ -218,17 +220,17 @@ class RunDeflater {
   std::uint64_t weighted_sum_ = 0;
 };
 
-void RunDeflater::closeMatch() {
+void SpanDeflater::closeMatch() {
   if (open_match_) deflate_.match(open_match_, static_cast<std::uint32_t>(stride_));
   open_match_ = 0;
 }
 
-void RunDeflater::encodeRow(std::uint32_t y) {
+void SpanDeflater::encodeRow(std::uint32_t y) {
   constexpr std::uint64_t max_match = DeflateWriter::max_match;
   const bool comparable = y > 0 && stride_ <= DeflateWriter::window;
   const std::uint64_t row_position = y * stride_;
   hashRow();
-  std::size_t run = row_begin_;
+  std::size_t span = row_begin_;
   std::size_t above = above_begin_;
   std::uint64_t byte = 0;
   const auto match_above = [&](std::uint64_t length) {
@@ -237,18 +239,18 @@ void RunDeflater::encodeRow(std::uint32_t y) {
     if (byte < stride_ || open_match_ == max_match) closeMatch();
   };
   while (byte < stride_) {
-    while (endByte(run) <= byte) ++run;
+    while (endByte(span) <= byte) ++span;
     while (comparable && endByte(above) <= byte) ++above;
-    const std::uint64_t begin_byte = beginByte(run);
+    const std::uint64_t begin_byte = beginByte(span);
     const std::uint64_t first_end = begin_byte + unit_;
-    const std::uint64_t rest = byte >= first_end ? endByte(run) - byte : 0;
+    const std::uint64_t rest = byte >= first_end ? endByte(span) - byte : 0;
     if (rest >= max_match && !open_match_) {
       const auto times = static_cast<std::uint32_t>(rest / max_match);
       deflate_.match(DeflateWriter::max_match, static_cast<std::uint32_t>(unit_), times);
       byte += times * max_match;
       continue;
     }
-    const std::uint64_t agreeing = comparable ? agreement(byte, run, above) : 0;
+    const std::uint64_t agreeing = comparable ? agreement(byte, span, above) : 0;
     if (open_match_) {
       match_above(std::min(agreeing, max_match - open_match_));
       continue;
@@ -270,12 +272,12 @@ void RunDeflater::encodeRow(std::uint32_t y) {
     std::uint64_t best = std::max<std::uint64_t>(agreeing, DeflateWriter::min_match - 1);
     std::uint64_t distance = 0;
     if (byte == begin_byte && agreeing < max_match) {
-      insertUpTo(run, row_position);
+      insertUpTo(span, row_position);
       for (int order = 0; order < orders; ++order) {
-        const Seen& seen = seen_[order][hash_[order][run - row_begin_]];
+        const Seen& seen = seen_[order][hash_[order][span - row_begin_]];
         const std::uint64_t seen_distance = row_position + byte - seen.position;
         if (!seen.position || seen_distance > DeflateWriter::window) continue;
-        if (const std::uint64_t length = agreementOfRuns(seen.index, run); length > best) {
+        if (const std::uint64_t length = agreementOfSpans(seen.index, span); length > best) {
           best = length;
           distance = seen_distance;
         }
@@ -287,13 +289,14 @@ void RunDeflater::encodeRow(std::uint32_t y) {
     } else if (agreeing >= DeflateWriter::min_match) {
       match_above(agreeing);
     } else {
-      const std::uint64_t end = byte < first_end ? first_end : endByte(run);
+      const std::uint64_t end = byte < first_end ? first_end : endByte(span);
       for (; byte < end; ++byte) {
-        deflate_.literal(static_cast<std::uint8_t>(runs_[run].value >> (8 * ((byte - 1) % unit_))));
+        deflate_.literal(
+            static_cast<std::uint8_t>(spans_[span].value >> (8 * ((byte - 1) % unit_))));
       }
     }
   }
-  insertUpTo(runs_.size(), row_position);
+  insertUpTo(spans_.size(), row_position);
 }
 
 void putBigEndian(std::vector<std::uint8_t>& out, std::uint32_t value) {
@@ -316,7 +319,7 @@ void endChunk(std::vector<std::uint8_t>& out, std::size_t begin) {
 
 }  // namespace
 
-std::vector<std::uint8_t> encodePng(const RunImage& image, const PngFormat& format) {
+std::vector<std::uint8_t> encodePng(const SpanImage& image, const PngFormat& format) {
   constexpr std::uint32_t largest = 1 << 24;
   if (image.width == 0 || image.height == 0 || image.width > largest || image.height > largest) {
     throw DataError("an image of " + std::to_string(image.width) + " x " +
@@ -345,7 +348,7 @@ std::vector<std::uint8_t> encodePng(const RunImage& image, const PngFormat& form
 
   chunk = beginChunk(out, "IDAT");
   out.insert(out.end(), {0x78, 0xda});
-  const std::uint32_t adler = RunDeflater(image, format, out).run();
+  const std::uint32_t adler = SpanDeflater(image, format, out).run();
   putBigEndian(out, adler);
   if (out.size() - chunk >= std::size_t{1} << 31)
     throw DataError("an image is too large for one PNG chunk");

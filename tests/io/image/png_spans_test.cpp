@@ -1,4 +1,4 @@
-#include "io/image/png_runs.h"
+#include "io/image/png_spans.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -12,8 +12,8 @@
 
 #include "io/file/staged_output.h"
 #include "tests/support/png_reader.h"
-#include "tests/support/run_images.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/span_images.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -21,7 +21,7 @@ namespace {
 
 using test::PngImage;
 using test::readPng;
-using test::runImage;
+using test::spanImage;
 
 std::vector<std::uint8_t> decodeBySpng(const std::vector<std::uint8_t>& bytes) {
   spng_ctx* context = spng_ctx_new(0);
@@ -38,14 +38,14 @@ std::vector<std::uint8_t> decodeBySpng(const std::vector<std::uint8_t>& bytes) {
 }
 
 /// What the rows must hold, from the definition.
-std::vector<std::uint8_t> pixelBytes(const RunImage& image, const PngFormat& format) {
+std::vector<std::uint8_t> pixelBytes(const SpanImage& image, const PngFormat& format) {
   std::vector<std::uint8_t> bytes;
   for (std::uint32_t y = 0; y < image.height; ++y) {
     std::uint32_t x = 0;
     const std::size_t row_begin = bytes.size();
-    for (const Run& run : image.row(y)) {
-      const std::uint32_t pixel = format.palette.empty() ? run.value : format.palette[run.value];
-      for (; x < run.end; ++x) {
+    for (const Span& span : image.row(y)) {
+      const std::uint32_t pixel = format.palette.empty() ? span.value : format.palette[span.value];
+      for (; x < span.end; ++x) {
         if (format.pixels == PngPixels::rgba8) {
           for (int shift = 0; shift < 32; shift += 8)
             bytes.push_back(static_cast<std::uint8_t>(pixel >> shift));
@@ -61,7 +61,7 @@ std::vector<std::uint8_t> pixelBytes(const RunImage& image, const PngFormat& for
   return bytes;
 }
 
-void expectDecodes(const RunImage& image, const PngFormat& format) {
+void expectDecodes(const SpanImage& image, const PngFormat& format) {
   const std::vector<std::uint8_t> bytes = encodePng(image, format);
   const std::vector<std::uint8_t> expected = pixelBytes(image, format);
   const PngImage decoded = readPng(bytes);
@@ -74,7 +74,7 @@ void expectDecodes(const RunImage& image, const PngFormat& format) {
       << "by spng, " << image.width << " x " << image.height;
 }
 
-void expectDecodesInEveryFormat(const RunImage& image, std::span<const std::uint32_t> colours) {
+void expectDecodesInEveryFormat(const SpanImage& image, std::span<const std::uint32_t> colours) {
   expectDecodes(image, {PngPixels::rgba8, colours, 0, 0});
   std::vector<std::uint32_t> greys;
   std::vector<std::uint32_t> bits;
@@ -91,56 +91,56 @@ const std::vector<std::uint32_t> colours = {rgba(0, 0, 0),     rgba(240, 240, 24
                                             rgba(26, 26, 29),  rgba(0, 90, 158),
                                             rgba(166, 33, 98), rgba(200, 189, 3, 17)};
 
-TEST(PngRuns, OnePixel) {
+TEST(PngSpans, OnePixel) {
   for (std::uint32_t value = 0; value < 2; ++value) {
-    expectDecodesInEveryFormat(runImage(1, 1, [&](int, int) { return value; }), colours);
+    expectDecodesInEveryFormat(spanImage(1, 1, [&](int, int) { return value; }), colours);
   }
 }
 
-TEST(PngRuns, EverySmallSizeOfNoise) {
+TEST(PngSpans, EverySmallSizeOfNoise) {
   std::mt19937 random(1);
   for (int width = 1; width <= 20; ++width) {
     for (int height = 1; height <= 7; ++height) {
-      const RunImage image =
-          runImage(width, height, [&](int, int) { return random() % colours.size(); });
+      const SpanImage image =
+          spanImage(width, height, [&](int, int) { return random() % colours.size(); });
       expectDecodesInEveryFormat(image, colours);
     }
   }
 }
 
-TEST(PngRuns, EqualImagesOfEverySmallWidthWhereMatchesCrossManyRows) {
+TEST(PngSpans, EqualImagesOfEverySmallWidthWhereMatchesCrossManyRows) {
   for (int width = 1; width <= 70; ++width) {
-    expectDecodesInEveryFormat(runImage(width, 300, [](int, int) { return 1U; }), colours);
+    expectDecodesInEveryFormat(spanImage(width, 300, [](int, int) { return 1U; }), colours);
   }
 }
 
-TEST(PngRuns, RunsOfEveryRemainderOfTheLongestMatch) {
-  const RunImage image = runImage(700, 700, [](int x, int y) { return x < y ? 1U : 0U; });
+TEST(PngSpans, SpansOfEveryRemainderOfTheLongestMatch) {
+  const SpanImage image = spanImage(700, 700, [](int x, int y) { return x < y ? 1U : 0U; });
   expectDecodesInEveryFormat(image, colours);
 }
 
-TEST(PngRuns, SliceWithDitheredRim) {
+TEST(PngSpans, SliceWithDitheredRim) {
   for (const std::uint32_t seed : {1, 2}) {
     expectDecodesInEveryFormat(test::ditheredDisc(601, 307, 6, seed), colours);
   }
 }
 
-TEST(PngRuns, NoiseOfTwoAndSixColoursOverManyBlocks) {
+TEST(PngSpans, NoiseOfTwoAndSixColoursOverManyBlocks) {
   std::mt19937 random(3);
-  expectDecodesInEveryFormat(runImage(900, 300, [&](int, int) { return random() % 2; }), colours);
-  expectDecodesInEveryFormat(runImage(900, 300, [&](int, int) { return random() % 6; }), colours);
+  expectDecodesInEveryFormat(spanImage(900, 300, [&](int, int) { return random() % 2; }), colours);
+  expectDecodesInEveryFormat(spanImage(900, 300, [&](int, int) { return random() % 6; }), colours);
 }
 
-TEST(PngRuns, NoiseOfPixelValuesWithoutPalette) {
+TEST(PngSpans, NoiseOfPixelValuesWithoutPalette) {
   std::mt19937 random(4);
-  expectDecodes(runImage(300, 200, [&](int, int) { return static_cast<std::uint32_t>(random()); }),
+  expectDecodes(spanImage(300, 200, [&](int, int) { return static_cast<std::uint32_t>(random()); }),
                 {});
 }
 
-TEST(PngRuns, RowsJustInsideAndOutsideTheWindow) {
+TEST(PngSpans, RowsJustInsideAndOutsideTheWindow) {
   std::mt19937 random(5);
   for (const int width : {8190, 8191, 8192, 8193, 32766, 32767, 32768, 32769, 70000}) {
-    const RunImage image = runImage(width, 6, [&](int x, int y) {
+    const SpanImage image = spanImage(width, 6, [&](int x, int y) {
       return x / 50 % 7 == 0 ? static_cast<std::uint32_t>(random() % 3)
                              : static_cast<std::uint32_t>((x + y) / 900 % 4);
     });
@@ -148,31 +148,31 @@ TEST(PngRuns, RowsJustInsideAndOutsideTheWindow) {
   }
 }
 
-TEST(PngRuns, BitsAcrossByteBorders) {
+TEST(PngSpans, BitsAcrossByteBorders) {
   std::mt19937 random(6);
   for (int round = 0; round < 200; ++round) {
     const int width = 1 + static_cast<int>(random() % 90);
     const std::uint32_t sparse = 1 + random() % 12;
-    const RunImage image =
-        runImage(width, 4, [&](int, int) { return random() % sparse == 0 ? 1U : 0U; });
+    const SpanImage image =
+        spanImage(width, 4, [&](int, int) { return random() % sparse == 0 ? 1U : 0U; });
     expectDecodes(image, {PngPixels::grey1, {}, 0, 0});
   }
 }
 
-TEST(PngRuns, NeighbouringRunsOfOneColourAreOne) {
-  const RunImage image =
-      runImage(500, 20, [](int x, int) { return static_cast<std::uint32_t>(x / 3 % 4); });
+TEST(PngSpans, NeighbouringSpansOfOneColourAreOne) {
+  const SpanImage image =
+      spanImage(500, 20, [](int x, int) { return static_cast<std::uint32_t>(x / 3 % 4); });
   const std::vector<std::uint32_t> palette = {7, 7, 7, 7};
   expectDecodes(image, {PngPixels::rgba8, palette, 0, 0});
   EXPECT_EQ(encodePng(image, {PngPixels::rgba8, palette, 0, 0}),
-            encodePng(runImage(500, 20, [](int, int) { return 7U; }), {}));
+            encodePng(spanImage(500, 20, [](int, int) { return 7U; }), {}));
 }
 
-TEST(PngRuns, PillowReadsTheSamePixels) {
+TEST(PngSpans, PillowReadsTheSamePixels) {
   if (std::system("/usr/bin/python3 -c 'import PIL.Image' 2>/dev/null") != 0)
     GTEST_SKIP() << "no Pillow here";
   const test::ScratchFolder scratch;
-  const RunImage image = test::ditheredDisc(601, 307, 20, 7);
+  const SpanImage image = test::ditheredDisc(601, 307, 20, 7);
   const std::vector<std::uint32_t> greys = {9, 200};
   for (const PngFormat& format :
        {PngFormat{PngPixels::rgba8, colours, 0, 0}, PngFormat{PngPixels::grey8, greys, 0, 0},
@@ -187,25 +187,25 @@ TEST(PngRuns, PillowReadsTheSamePixels) {
   }
 }
 
-TEST(PngRuns, PixelSizeIsDotsPerMetre) {
-  const RunImage image = runImage(3, 2, [](int, int) { return 0U; });
+TEST(PngSpans, PixelSizeIsDotsPerMetre) {
+  const SpanImage image = spanImage(3, 2, [](int, int) { return 0U; });
   const PngImage decoded =
       readPng(encodePng(image, {PngPixels::grey8, {}, 25.4 / 600, 25.4 / 300}));
   EXPECT_EQ(decoded.dots_per_metre_x, 23622U);
   EXPECT_EQ(decoded.dots_per_metre_y, 11811U);
 }
 
-TEST(PngRuns, BlankImageCostsTwoBitsPer258BytesAndAFewPerRow) {
-  const RunImage image = runImage(2857, 1416, [](int, int) { return 0U; });
+TEST(PngSpans, BlankImageCostsTwoBitsPer258BytesAndAFewPerRow) {
+  const SpanImage image = spanImage(2857, 1416, [](int, int) { return 0U; });
   const double bytes = 1416.0 * 2857 * 4;
   EXPECT_LT(static_cast<double>(encodePng(image, {PngPixels::rgba8, colours, 0, 0}).size()),
             bytes / 258 / 4 + 1416 * 3 + 200);
 }
 
-TEST(PngRuns, AnImageWithoutPixelsIsRefused) {
+TEST(PngSpans, AnImageWithoutPixelsIsRefused) {
   EXPECT_THAT(
       [] {
-        encodePng(RunImage{0, 3, {0, 0, 0, 0}, {}}, {});
+        encodePng(SpanImage{0, 3, {0, 0, 0, 0}, {}}, {});
       },
       testing::ThrowsMessage<DataError>(
           "an image of 0 x 3 pixels cannot be a PNG; each side must have 1 to 16777216"));

@@ -1,4 +1,4 @@
-#include "io/stack/slice_runs.h"
+#include "io/stack/slice_spans.h"
 
 #ifdef __SSE2__
 #include <emmintrin.h>
@@ -26,10 +26,10 @@ using openvdb::Coord;
 constexpr std::ptrdiff_t strip_rows = 64;
 static_assert(strip_rows == leaf_layers * leaf_layers);
 
-/// The runs of a strip, row after row.
-struct StripRuns {
+/// The spans of a strip, row after row.
+struct StripSpans {
   std::array<std::uint32_t, strip_rows + 1> begin{};
-  std::vector<Run> runs;
+  std::vector<Span> spans;
 };
 
 using LeafValues = std::array<std::int32_t, leaf_layers * strip_rows>;
@@ -74,7 +74,7 @@ std::uint64_t differing(const std::int32_t* a, const std::int32_t* b) {
 #endif
 }
 
-/// Collects the runs of a strip from left to right.
+/// Collects the spans of a strip from left to right.
 class StripBuilder {
  public:
   void clear() {
@@ -100,15 +100,15 @@ class StripBuilder {
     }
   }
 
-  [[nodiscard]] StripRuns finish(std::uint32_t width) {
-    StripRuns strip;
+  [[nodiscard]] StripSpans finish(std::uint32_t width) {
+    StripSpans strip;
     std::size_t count = strip_rows;
     for (const auto& row : rows_) count += row.size();
-    strip.runs.reserve(count);
+    strip.spans.reserve(count);
     for (int row = 0; row < strip_rows; ++row) {
-      strip.runs.insert(strip.runs.end(), rows_[row].begin(), rows_[row].end());
-      strip.runs.push_back({width, static_cast<std::uint32_t>(values_[row])});
-      strip.begin[row + 1] = static_cast<std::uint32_t>(strip.runs.size());
+      strip.spans.insert(strip.spans.end(), rows_[row].begin(), rows_[row].end());
+      strip.spans.push_back({width, static_cast<std::uint32_t>(values_[row])});
+      strip.begin[row + 1] = static_cast<std::uint32_t>(strip.spans.size());
     }
     return strip;
   }
@@ -120,20 +120,20 @@ class StripBuilder {
     values_[row] = value;
   }
 
-  std::array<std::vector<Run>, strip_rows> rows_;
+  std::array<std::vector<Span>, strip_rows> rows_;
   std::array<std::int32_t, strip_rows> values_{};
   bool uniform_ = true;
 };
 
 template <typename Grid>
-StripRuns walkStrip(const Grid& grid, const SliceFrame& frame, int y, int z,
-                    StripBuilder& builder) {
+StripSpans walkStrip(const Grid& grid, const SliceLayout& layout, int y, int z,
+                     StripBuilder& builder) {
   using Tree = typename Grid::TreeType;
   using Branch = typename Tree::RootNodeType::ChildNodeType::ChildNodeType;
-  const int x_begin = frame.box.min().x();
-  const int x_end = frame.box.max().x() + 1;
+  const int x_begin = layout.box.min().x();
+  const int x_end = layout.box.max().x() + 1;
   const auto column = [&](int x) {
-    return static_cast<std::uint32_t>(std::max(x, x_begin) - x_begin + frame.padding);
+    return static_cast<std::uint32_t>(std::max(x, x_begin) - x_begin + layout.padding);
   };
   const auto accessor = grid.getConstAccessor();
   LeafValues scratch;
@@ -161,26 +161,26 @@ StripRuns walkStrip(const Grid& grid, const SliceFrame& frame, int y, int z,
       }
     }
   }
-  if (frame.padding) builder.fill(frame.width() - frame.padding, 0);
-  return builder.finish(frame.width());
+  if (layout.padding) builder.fill(layout.width() - layout.padding, 0);
+  return builder.finish(layout.width());
 }
 
-void mirror(std::span<Run> runs) {
-  std::reverse(runs.begin(), runs.end());
-  const std::uint32_t width = runs.front().end;
-  for (std::size_t i = 0; i + 1 < runs.size(); ++i) runs[i].end = width - runs[i + 1].end;
-  runs.back().end = width;
+void mirror(std::span<Span> spans) {
+  std::reverse(spans.begin(), spans.end());
+  const std::uint32_t width = spans.front().end;
+  for (std::size_t i = 0; i + 1 < spans.size(); ++i) spans[i].end = width - spans[i + 1].end;
+  spans.back().end = width;
 }
 
 template <typename Grid>
-std::vector<RunImage> slice(const Grid& grid, const SliceFrame& frame, ZRange layers) {
-  std::vector<RunImage> images(std::max(0, layers.size()));
+std::vector<SpanImage> slice(const Grid& grid, const SliceLayout& layout, ZRange layers) {
+  std::vector<SpanImage> images(std::max(0, layers.size()));
   const ZRange aligned = alignedToLeaves(layers);
-  const int y_begin = frame.box.min().y() & ~(leaf_layers - 1);
-  const int strip_count = (frame.box.max().y() - y_begin) / leaf_layers + 1;
+  const int y_begin = layout.box.min().y() & ~(leaf_layers - 1);
+  const int strip_count = (layout.box.max().y() - y_begin) / leaf_layers + 1;
   // One over the other: tiles that are neighbours along z share a cache line.
-  std::vector<StripRuns> all_strips(static_cast<std::size_t>(aligned.size() / leaf_layers) *
-                                    strip_count);
+  std::vector<StripSpans> all_strips(static_cast<std::size_t>(aligned.size() / leaf_layers) *
+                                     strip_count);
   const auto stripsAt = [&](int z) {
     return std::span(all_strips)
         .subspan(static_cast<std::size_t>((z - aligned.begin) / leaf_layers) * strip_count,
@@ -189,39 +189,39 @@ std::vector<RunImage> slice(const Grid& grid, const SliceFrame& frame, ZRange la
   tbb::parallel_for(0, strip_count, [&](int strip) {
     StripBuilder builder;
     for (int z = aligned.begin; z < aligned.end; z += leaf_layers)
-      stripsAt(z)[strip] = walkStrip(grid, frame, y_begin + strip * leaf_layers, z, builder);
+      stripsAt(z)[strip] = walkStrip(grid, layout, y_begin + strip * leaf_layers, z, builder);
   });
   for (int z = aligned.begin; z < aligned.end; z += leaf_layers) {
-    const std::span<const StripRuns> strips = stripsAt(z);
+    const std::span<const StripSpans> strips = stripsAt(z);
     const ZRange here = intersection({z, z + leaf_layers}, layers);
     tbb::parallel_for(here.begin, here.end, [&](int layer) {
-      RunImage& image = images[layer - layers.begin];
-      image.width = frame.width();
-      image.height = frame.height();
+      SpanImage& image = images[layer - layers.begin];
+      image.width = layout.width();
+      image.height = layout.height();
       image.row_begin.reserve(image.height + 1);
       image.row_begin.push_back(0);
-      std::size_t size = 2 * static_cast<std::size_t>(frame.padding);
-      for (const StripRuns& strip : strips) {
+      std::size_t size = 2 * static_cast<std::size_t>(layout.padding);
+      for (const StripSpans& strip : strips) {
         for (int row = layer - z; row < strip_rows; row += leaf_layers)
           size += strip.begin[row + 1] - strip.begin[row];
       }
-      image.runs.reserve(size);
+      image.spans.reserve(size);
       const auto add_blank_rows = [&] {
-        for (int i = 0; i < frame.padding; ++i) {
-          image.runs.push_back({image.width, 0});
-          image.row_begin.push_back(image.runs.size());
+        for (int i = 0; i < layout.padding; ++i) {
+          image.spans.push_back({image.width, 0});
+          image.row_begin.push_back(image.spans.size());
         }
       };
       add_blank_rows();
-      const int rows = frame.box.dim().y();
+      const int rows = layout.box.dim().y();
       for (int i = 0; i < rows; ++i) {
-        const int y = frame.flip_y ? frame.box.min().y() + i : frame.box.max().y() - i;
-        const StripRuns& strip = strips[(y - y_begin) / leaf_layers];
+        const int y = layout.flip_y ? layout.box.min().y() + i : layout.box.max().y() - i;
+        const StripSpans& strip = strips[(y - y_begin) / leaf_layers];
         const int row = (y - y_begin) % leaf_layers * leaf_layers + (layer - z);
-        image.runs.insert(image.runs.end(), strip.runs.begin() + strip.begin[row],
-                          strip.runs.begin() + strip.begin[row + 1]);
-        if (frame.flip_x) mirror(std::span(image.runs).subspan(image.row_begin.back()));
-        image.row_begin.push_back(image.runs.size());
+        image.spans.insert(image.spans.end(), strip.spans.begin() + strip.begin[row],
+                           strip.spans.begin() + strip.begin[row + 1]);
+        if (layout.flip_x) mirror(std::span(image.spans).subspan(image.row_begin.back()));
+        image.row_begin.push_back(image.spans.size());
       }
       add_blank_rows();
     });
@@ -235,33 +235,35 @@ using Leaf = openvdb::Int32Tree::LeafNodeType;
 /// 64 rows are wholly of one value.
 class LeafStrip {
  public:
-  LeafStrip(const SliceFrame& frame, int y, int z)
-      : frame_(frame),
+  LeafStrip(const SliceLayout& layout, int y, int z)
+      : layout_(layout),
         y_(y),
         z_(z),
-        first_(frame.box.min().x() >> 3),
-        leaves_(static_cast<std::size_t>((frame.box.max().x() >> 3) - first_ + 1)) {}
+        first_(layout.box.min().x() >> 3),
+        leaves_(static_cast<std::size_t>((layout.box.max().x() >> 3) - first_ + 1)) {}
 
   /// Where `images` hold the layers from `first_layer` on.
-  void fill(std::span<const RunImage> images, int first_layer) {
-    const auto each_run = [&](const auto& take) {
+  void fill(std::span<const SpanImage> images, int first_layer) {
+    const auto each_span = [&](const auto& take) {
       for (int row = 0; row < strip_rows; ++row) {
         const int y = y_ + row / leaf_layers;
         const int z = z_ + row % leaf_layers;
-        if (y < frame_.box.min().y() || y > frame_.box.max().y() || z < first_layer ||
+        if (y < layout_.box.min().y() || y > layout_.box.max().y() || z < first_layer ||
             z >= first_layer + std::ssize(images)) {
           continue;
         }
-        const int from_top = frame_.flip_y ? y - frame_.box.min().y() : frame_.box.max().y() - y;
+        const int from_top = layout_.flip_y ? y - layout_.box.min().y() : layout_.box.max().y() - y;
         std::uint32_t begin = 0;
-        for (const Run& run : images[z - first_layer].row(from_top + frame_.padding)) {
-          if (run.value) take(row, columns(begin, run.end), static_cast<std::int32_t>(run.value));
-          begin = run.end;
+        for (const Span& span : images[z - first_layer].row(from_top + layout_.padding)) {
+          if (span.value)
+            take(row, columns(begin, span.end), static_cast<std::int32_t>(span.value));
+          begin = span.end;
         }
       }
     };
-    each_run([&](int, std::pair<int, int> x, std::int32_t value) { countWholeRows(x, value); });
-    each_run([&](int row, std::pair<int, int> x, std::int32_t value) { setVoxels(row, x, value); });
+    each_span([&](int, std::pair<int, int> x, std::int32_t value) { countWholeRows(x, value); });
+    each_span(
+        [&](int row, std::pair<int, int> x, std::int32_t value) { setVoxels(row, x, value); });
   }
 
   /// Hands over what was made.
@@ -288,11 +290,11 @@ class LeafStrip {
 
   /// The voxels, half open, behind columns of a picture.
   [[nodiscard]] std::pair<int, int> columns(std::uint32_t begin, std::uint32_t end) const {
-    const int low = frame_.box.min().x();
-    const int high = frame_.box.max().x() + 1;
-    int from = static_cast<int>(begin) - frame_.padding;
-    int to = static_cast<int>(end) - frame_.padding;
-    if (frame_.flip_x) {
+    const int low = layout_.box.min().x();
+    const int high = layout_.box.max().x() + 1;
+    int from = static_cast<int>(begin) - layout_.padding;
+    int to = static_cast<int>(end) - layout_.padding;
+    if (layout_.flip_x) {
       std::swap(from, to);
       from = high - low - from;
       to = high - low - to;
@@ -325,7 +327,7 @@ class LeafStrip {
     }
   }
 
-  const SliceFrame& frame_;
+  const SliceLayout& layout_;
   int y_, z_;
   int first_;  ///< leaf along x
   std::vector<Place> leaves_;
@@ -333,17 +335,17 @@ class LeafStrip {
 
 }  // namespace
 
-openvdb::Int32Grid::Ptr gridOfRuns(std::span<const RunImage> images, const SliceFrame& frame,
-                                   ZRange layers) {
+openvdb::Int32Grid::Ptr gridOfSpans(std::span<const SpanImage> images, const SliceLayout& layout,
+                                    ZRange layers) {
   auto grid = openvdb::Int32Grid::create(0);
   auto target = grid->getAccessor();
-  const int y_begin = frame.box.min().y() & ~(leaf_layers - 1);
-  const int strip_count = (frame.box.max().y() - y_begin) / leaf_layers + 1;
+  const int y_begin = layout.box.min().y() & ~(leaf_layers - 1);
+  const int strip_count = (layout.box.max().y() - y_begin) / leaf_layers + 1;
   const ZRange aligned = alignedToLeaves(layers);
   for (int z = aligned.begin; z < aligned.end; z += leaf_layers) {
     std::vector<LeafStrip> strips;
     strips.reserve(strip_count);
-    for (int i = 0; i < strip_count; ++i) strips.emplace_back(frame, y_begin + i * leaf_layers, z);
+    for (int i = 0; i < strip_count; ++i) strips.emplace_back(layout, y_begin + i * leaf_layers, z);
     tbb::parallel_for(0, strip_count, [&](int i) { strips[i].fill(images, layers.begin); });
     for (LeafStrip& strip : strips) strip.moveTo(target);
   }
@@ -351,26 +353,26 @@ openvdb::Int32Grid::Ptr gridOfRuns(std::span<const RunImage> images, const Slice
   return grid;
 }
 
-std::vector<RunImage> sliceRuns(const openvdb::Int32Grid& grid, const SliceFrame& frame,
-                                ZRange layers) {
-  return slice(grid, frame, layers);
+std::vector<SpanImage> sliceSpans(const openvdb::Int32Grid& grid, const SliceLayout& layout,
+                                  ZRange layers) {
+  return slice(grid, layout, layers);
 }
 
-std::vector<RunImage> sliceRuns(const openvdb::BoolGrid& grid, const SliceFrame& frame,
-                                ZRange layers) {
-  return slice(grid, frame, layers);
+std::vector<SpanImage> sliceSpans(const openvdb::BoolGrid& grid, const SliceLayout& layout,
+                                  ZRange layers) {
+  return slice(grid, layout, layers);
 }
 
-RunImage blankSlice(const SliceFrame& frame) {
-  RunImage image{frame.width(), frame.height(), {}, {}};
+SpanImage blankSlice(const SliceLayout& layout) {
+  SpanImage image{layout.width(), layout.height(), {}, {}};
   for (std::uint32_t y = 0; y <= image.height; ++y) image.row_begin.push_back(y);
-  image.runs.assign(image.height, {image.width, 0});
+  image.spans.assign(image.height, {image.width, 0});
   return image;
 }
 
-bool isBlank(const RunImage& slice) {
-  return std::all_of(slice.runs.begin(), slice.runs.end(),
-                     [](const Run& run) { return run.value == 0; });
+bool isBlank(const SpanImage& slice) {
+  return std::all_of(slice.spans.begin(), slice.spans.end(),
+                     [](const Span& span) { return span.value == 0; });
 }
 
 }  // namespace vdbdither

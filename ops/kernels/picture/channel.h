@@ -6,9 +6,9 @@
 namespace vdbdither {
 
 /// One number for each pixel of a picture, top row first.
-struct Plane {
-  Plane() = default;
-  Plane(int columns, int rows, double value = 0)
+struct Channel {
+  Channel() = default;
+  Channel(int columns, int rows, double value = 0)
       : width(columns),
         height(rows),
         values(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), value) {}

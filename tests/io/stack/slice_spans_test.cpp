@@ -1,4 +1,4 @@
-#include "io/stack/slice_runs.h"
+#include "io/stack/slice_spans.h"
 
 #include <random>
 
@@ -13,13 +13,13 @@ using openvdb::CoordBBox;
 using openvdb::Int32Grid;
 
 /// Values of the pixels of a picture, row by row, a digit each.
-std::string drawn(const RunImage& image) {
+std::string drawn(const SpanImage& image) {
   std::string text;
   for (std::uint32_t y = 0; y < image.height; ++y) {
     std::uint32_t x = 0;
-    for (const Run& run : image.row(y)) {
-      EXPECT_LT(x, run.end);
-      for (; x < run.end; ++x) text += static_cast<char>('0' + run.value);
+    for (const Span& span : image.row(y)) {
+      EXPECT_LT(x, span.end);
+      for (; x < span.end; ++x) text += static_cast<char>('0' + span.value);
     }
     EXPECT_EQ(x, image.width);
     text += '\n';
@@ -29,15 +29,15 @@ std::string drawn(const RunImage& image) {
 
 /// The definition, voxel by voxel.
 template <typename Grid>
-std::string expected(const Grid& grid, const SliceFrame& frame, int z) {
+std::string expected(const Grid& grid, const SliceLayout& layout, int z) {
   std::string text;
-  const CoordBBox& box = frame.box;
-  for (int row = 0; row < static_cast<int>(frame.height()); ++row) {
-    for (int column = 0; column < static_cast<int>(frame.width()); ++column) {
-      const int x = frame.flip_x ? box.max().x() - (column - frame.padding)
-                                 : box.min().x() + column - frame.padding;
-      const int y = frame.flip_y ? box.min().y() + row - frame.padding
-                                 : box.max().y() - (row - frame.padding);
+  const CoordBBox& box = layout.box;
+  for (int row = 0; row < static_cast<int>(layout.height()); ++row) {
+    for (int column = 0; column < static_cast<int>(layout.width()); ++column) {
+      const int x = layout.flip_x ? box.max().x() - (column - layout.padding)
+                                  : box.min().x() + column - layout.padding;
+      const int y = layout.flip_y ? box.min().y() + row - layout.padding
+                                  : box.max().y() - (row - layout.padding);
       const Coord at(x, y, z);
       const bool shown = box.isInside(Coord(x, y, box.min().z()));
       text += static_cast<char>('0' + (shown ? static_cast<int>(grid.tree().getValue(at)) : 0));
@@ -50,33 +50,33 @@ std::string expected(const Grid& grid, const SliceFrame& frame, int z) {
 template <typename Grid>
 void expectShowsEveryVoxel(const Grid& grid, const CoordBBox& box, ZRange layers) {
   for (int i = 0; i < 8; ++i) {
-    const SliceFrame frame{box, i & 4 ? 3 : 0, (i & 1) != 0, (i & 2) != 0};
-    const std::vector<RunImage> images = sliceRuns(grid, frame, layers);
+    const SliceLayout layout{box, i & 4 ? 3 : 0, (i & 1) != 0, (i & 2) != 0};
+    const std::vector<SpanImage> images = sliceSpans(grid, layout, layers);
     ASSERT_EQ(images.size(), static_cast<std::size_t>(layers.size()));
     for (int z = layers.begin; z < layers.end; ++z) {
-      const RunImage& image = images[z - layers.begin];
-      ASSERT_EQ(drawn(image), expected(grid, frame, z)) << "layer " << z;
+      const SpanImage& image = images[z - layers.begin];
+      ASSERT_EQ(drawn(image), expected(grid, layout, z)) << "layer " << z;
       for (std::uint32_t y = 0; y < image.height; ++y) {
-        for (std::size_t run = 1; run < image.row(y).size(); ++run) {
-          ASSERT_NE(image.row(y)[run].value, image.row(y)[run - 1].value)
-              << "a run ends without need";
+        for (std::size_t span = 1; span < image.row(y).size(); ++span) {
+          ASSERT_NE(image.row(y)[span].value, image.row(y)[span - 1].value)
+              << "a span ends without need";
         }
       }
     }
   }
 }
 
-TEST(SliceRuns, ShowTheGreatestYOnTop) {
+TEST(SliceSpans, ShowTheGreatestYOnTop) {
   auto grid = Int32Grid::create(0);
   grid->tree().setValue(Coord(1, 0, 5), 1);
   grid->tree().setValue(Coord(2, 1, 5), 2);
-  const SliceFrame frame{CoordBBox(Coord(0, 0, 0), Coord(3, 1, 7)), 0, false, false};
-  EXPECT_EQ(drawn(sliceRuns(*grid, frame, {5, 6})[0]),
+  const SliceLayout layout{CoordBBox(Coord(0, 0, 0), Coord(3, 1, 7)), 0, false, false};
+  EXPECT_EQ(drawn(sliceSpans(*grid, layout, {5, 6})[0]),
             "0020\n"
             "0100\n");
 }
 
-TEST(SliceRuns, ShowEveryVoxelOfNoiseTilesAndEmptySpace) {
+TEST(SliceSpans, ShowEveryVoxelOfNoiseTilesAndEmptySpace) {
   std::mt19937 random(1);
   auto grid = Int32Grid::create(0);
   const CoordBBox box(Coord(-37, -11, -9), Coord(300, 20, 14));
@@ -92,13 +92,13 @@ TEST(SliceRuns, ShowEveryVoxelOfNoiseTilesAndEmptySpace) {
   expectShowsEveryVoxel(*grid, box, {-3, 2});
 }
 
-TEST(SliceRuns, AreCutAtTheBox) {
+TEST(SliceSpans, AreCutAtTheBox) {
   auto grid = Int32Grid::create(0);
   grid->fill(CoordBBox(Coord(-100), Coord(100)), 1);
   expectShowsEveryVoxel(*grid, CoordBBox(Coord(-3, 5, -1), Coord(12, 9, 2)), {-1, 3});
 }
 
-TEST(SliceRuns, OfASetShowWhatIsActiveAndTrue) {
+TEST(SliceSpans, OfASetShowWhatIsActiveAndTrue) {
   std::mt19937 random(2);
   auto grid = BoolGrid::create(false);
   grid->fill(CoordBBox(Coord(0, 0, 0), Coord(31, 15, 15)), true);

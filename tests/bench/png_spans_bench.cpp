@@ -1,6 +1,6 @@
-// Slices of 2857 x 1416 pixels as RGBA PNG: from runs, and by the general encoders from a buffer of
-// pixels. items_per_second are pixels, that is voxels of the bounding box; `bytes` is the size of
-// the file.
+// Slices of 2857 x 1416 pixels as RGBA PNG: from spans, and by the general encoders from a buffer
+// of pixels. items_per_second are pixels, that is voxels of the bounding box; `bytes` is the size
+// of the file.
 
 #include <functional>
 #include <random>
@@ -10,8 +10,8 @@
 #include <png.h>
 #include <spng.h>
 
-#include "io/image/png_runs.h"
-#include "tests/support/run_images.h"
+#include "io/image/png_spans.h"
+#include "tests/support/span_images.h"
 
 namespace vdbdither {
 namespace {
@@ -22,14 +22,14 @@ const std::vector<std::uint32_t> palette = {rgba(0, 0, 0),     rgba(240, 240, 24
                                             rgba(26, 26, 29),  rgba(0, 90, 158),
                                             rgba(166, 33, 98), rgba(200, 189, 3)};
 
-RunImage noise(std::uint32_t colours) {
+SpanImage noise(std::uint32_t colours) {
   std::mt19937 random(1);
-  return test::runImage(width, height, [&](int, int) { return random() % colours; });
+  return test::spanImage(width, height, [&](int, int) { return random() % colours; });
 }
 
-const RunImage& slice(int kind) {
-  static const std::vector<RunImage> slices = {
-      test::runImage(width, height, [](int, int) { return 0U; }),
+const SpanImage& slice(int kind) {
+  static const std::vector<SpanImage> slices = {
+      test::spanImage(width, height, [](int, int) { return 0U; }),
       test::ditheredDisc(width, height, 1e-9, 1),
       test::ditheredDisc(width, height, 6, 1),
       test::ditheredDisc(width, height, 100, 1),
@@ -41,11 +41,11 @@ const RunImage& slice(int kind) {
 const char* const names[] = {"blank",      "disc",      "disc, rim of 6", "disc, rim of 100",
                              "noise of 2", "noise of 6"};
 
-std::vector<std::uint32_t> pixelsOf(const RunImage& image) {
+std::vector<std::uint32_t> pixelsOf(const SpanImage& image) {
   std::vector<std::uint32_t> pixels;
   for (std::uint32_t y = 0; y < image.height; ++y) {
-    for (const Run& run : image.row(y))
-      pixels.resize(std::size_t{y} * width + run.end, palette[run.value]);
+    for (const Span& span : image.row(y))
+      pixels.resize(std::size_t{y} * width + span.end, palette[span.value]);
   }
   return pixels;
 }
@@ -56,11 +56,11 @@ void report(benchmark::State& state, std::size_t bytes) {
   state.counters["bytes"] = static_cast<double>(bytes);
 }
 
-void fromRuns(benchmark::State& state) {
-  const RunImage& image = slice(static_cast<int>(state.range(0)));
+void fromSpans(benchmark::State& state) {
+  const SpanImage& image = slice(static_cast<int>(state.range(0)));
   std::size_t bytes = 0;
   for (auto _ : state) bytes = encodePng(image, {PngPixels::rgba8, palette, 0.042, 0.084}).size();
-  state.counters["runs"] = static_cast<double>(image.runs.size());
+  state.counters["spans"] = static_cast<double>(image.spans.size());
   report(state, bytes);
 }
 
@@ -109,7 +109,7 @@ void bySpng(benchmark::State& state) {
   report(state, bytes);
 }
 
-BENCHMARK(fromRuns)->DenseRange(0, 5)->Unit(benchmark::kMicrosecond);
+BENCHMARK(fromSpans)->DenseRange(0, 5)->Unit(benchmark::kMicrosecond);
 BENCHMARK(byLibpng)
     ->ArgsProduct({{0, 1, 2, 3, 4, 5}, {1, 6}})
     ->Unit(benchmark::kMicrosecond)

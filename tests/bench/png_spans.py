@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 """Compares the run encoder with general PNG encoders and prints Markdown tables.
 
-usage: png_runs.py BENCH_PROGRAM [STACK_FOLDER]
+usage: png_spans.py BENCH_PROGRAM [STACK_FOLDER]
 
-BENCH_PROGRAM is png_runs_bench. STACK_FOLDER, a stack that slice-export wrote with --format png, is read and written
+BENCH_PROGRAM is png_spans_bench. STACK_FOLDER, a stack that slice-export wrote with --format png, is read and written
 again by Pillow (libpng's zlib without filters of its own choice) for size and time.
 """
 import glob

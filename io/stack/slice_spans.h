@@ -5,13 +5,13 @@
 
 #include "vdbdither/model/lattice.h"
 #include "vdbdither/model/openvdb.h"
-#include "vdbdither/model/run_image.h"
+#include "vdbdither/model/span_image.h"
 
 namespace vdbdither {
 
 /// Which voxels of a layer a picture shows, and which way round: seen from above, x to the right
 /// and y upwards, so that the first row holds the greatest y.
-struct SliceFrame {
+struct SliceLayout {
   openvdb::CoordBBox box;  ///< columns and rows come from its x and y, inclusive
   int padding = 0;         ///< empty voxels added on each side
   bool flip_x = false;
@@ -21,24 +21,25 @@ struct SliceFrame {
   [[nodiscard]] std::uint32_t height() const { return box.dim().y() + 2 * padding; }
 };
 
-/// The layers of `grid` as runs of its values, one picture per layer of `layers`. The tree is
+/// The layers of `grid` as spans of its values, one picture per layer of `layers`. The tree is
 /// walked once for eight layers together, in parallel; empty space and tiles cost next to nothing.
-std::vector<RunImage> sliceRuns(const openvdb::Int32Grid& grid, const SliceFrame& frame,
-                                ZRange layers);
+std::vector<SpanImage> sliceSpans(const openvdb::Int32Grid& grid, const SliceLayout& layout,
+                                  ZRange layers);
 
 /// The same for a set of voxels: 1 where active and true, else 0.
-std::vector<RunImage> sliceRuns(const openvdb::BoolGrid& grid, const SliceFrame& frame,
-                                ZRange layers);
+std::vector<SpanImage> sliceSpans(const openvdb::BoolGrid& grid, const SliceLayout& layout,
+                                  ZRange layers);
 
 /// A slice without a voxel.
-RunImage blankSlice(const SliceFrame& frame);
+SpanImage blankSlice(const SliceLayout& layout);
 
 /// Whether no voxel of it is printed.
-bool isBlank(const RunImage& slice);
+bool isBlank(const SpanImage& slice);
 
 /// The way back: a grid whose layers are the pictures `images`, the first one of them the layer
-/// `layers.begin`; 0 is inactive. What lies outside the frame's box is left out. In canonical form.
-openvdb::Int32Grid::Ptr gridOfRuns(std::span<const RunImage> images, const SliceFrame& frame,
-                                   ZRange layers);
+/// `layers.begin`; 0 is inactive. What lies outside the layout's box is left out. In canonical
+/// form.
+openvdb::Int32Grid::Ptr gridOfSpans(std::span<const SpanImage> images, const SliceLayout& layout,
+                                    ZRange layers);
 
 }  // namespace vdbdither
