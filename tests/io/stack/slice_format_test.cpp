@@ -105,7 +105,7 @@ Manifest writeCropped(const std::filesystem::path& target, const Manifest& stack
     const ZRange piece = intersection({z, z + 5}, given);
     std::vector<SpanImage> images;
     for (int layer = piece.begin; layer < piece.end; ++layer) {
-      images.push_back(test::runImage(19, 11, [&](int x, int) {
+      images.push_back(test::spanImage(19, 11, [&](int x, int) {
         return std::uint32_t{printed.contains(layer) && layer % 2 == 0 && x == 3};
       }));
     }
