@@ -12,6 +12,7 @@
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/surface_leaves.h"
+#include "ops/kernels/leaf/tie.h"
 #include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
@@ -71,8 +72,8 @@ FloatGrid::Ptr combined(const FloatGrid& a, const FloatGrid& b, Csg operation, Z
       const LeafValues other = LeafValues::of(of_b, origins[n]);
       for (unsigned offset = 0; offset < 512; ++offset) {
         const float mine = values.distance[offset];
-        const float others =
-            operation == Csg::subtract ? -other.distance[offset] : other.distance[offset];
+        const float others = operation == Csg::subtract ? complemented(other.distance[offset])
+                                                        : other.distance[offset];
         const bool take = operation == Csg::unite ? others < mine : others > mine;
         if (!take) continue;
         const std::uint64_t bit = std::uint64_t{1} << (offset % 64);

@@ -12,6 +12,7 @@
 #include <limits>
 
 #include "ops/kernels/distance/row_crossings.h"
+#include "ops/kernels/leaf/tie.h"
 
 namespace vdbdither {
 
@@ -287,10 +288,12 @@ template <int rank, bool track>
 }
 
 [[gnu::always_inline]] inline LeafBits finishAll(const float* distances, const LeafBits& inside,
-                                                 const LeafBits& exists, float limit_mm,
-                                                 float background_mm, float* values) {
+                                                 const LeafBits& exists, float tie_mm,
+                                                 float limit_mm, float background_mm,
+                                                 float* values) {
   constexpr RowBits bit{1, 2, 4, 8, 16, 32, 64, 128};
   const Row background = Row{} + background_mm;
+  const Row tied = Row{} + tied_mm;
   LeafBits active;
   for (std::size_t plane = 0; plane < edge; ++plane) {
     std::uint64_t found = 0;
@@ -299,7 +302,8 @@ template <int rank, bool track>
       const Row& distance = *reinterpret_cast<const Row*>(distances + offset);
       const RowBits on =
           (distance < limit_mm) & ((static_cast<std::int32_t>(exists[plane] >> row) & bit) == bit);
-      Row value = on ? distance : background;
+      Row value = distance < tie_mm ? tied : distance;
+      value = on ? value : background;
       reinterpret_cast<RowBits&>(value) |=
           ((static_cast<std::int32_t>(inside[plane] >> row) & bit) == bit) &
           std::numeric_limits<std::int32_t>::min();
@@ -327,8 +331,8 @@ void raisePortable(const LatticeSheet& sheet, float value, const LeafDistances& 
   raiseAll(sheet, value, at, values);
 }
 LeafBits finishPortable(const float* distances, const LeafBits& inside, const LeafBits& exists,
-                        float limit_mm, float background_mm, float* values) {
-  return finishAll(distances, inside, exists, limit_mm, background_mm, values);
+                        float tie_mm, float limit_mm, float background_mm, float* values) {
+  return finishAll(distances, inside, exists, tie_mm, limit_mm, background_mm, values);
 }
 
 #if defined(__x86_64__)
@@ -341,9 +345,10 @@ __attribute__((target("avx2"))) void raiseAvx2(const LatticeSheet& sheet, float 
   raiseAll(sheet, value, at, values);
 }
 __attribute__((target("avx2"))) LeafBits finishAvx2(const float* distances, const LeafBits& inside,
-                                                    const LeafBits& exists, float limit_mm,
-                                                    float background_mm, float* values) {
-  return finishAll(distances, inside, exists, limit_mm, background_mm, values);
+                                                    const LeafBits& exists, float tie_mm,
+                                                    float limit_mm, float background_mm,
+                                                    float* values) {
+  return finishAll(distances, inside, exists, tie_mm, limit_mm, background_mm, values);
 }
 #endif
 

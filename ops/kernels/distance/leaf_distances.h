@@ -134,9 +134,10 @@ struct LeafKernels {
   void (*raise)(const LatticeSheet& sheet, float value, const LeafDistances& at, float* values);
 
   /// Values in mm: −distance where `inside`, else +distance; ±background where not below `limit_mm`
-  /// or not in `exists`. Returns the bits of the voxels that are.
+  /// or not in `exists`. Distances below `tie_mm` become `tied_mm`. Returns the bits of the voxels
+  /// that are below the limit.
   LeafBits (*finish)(const float* distances, const LeafBits& inside, const LeafBits& exists,
-                     float limit_mm, float background_mm, float* values);
+                     float tie_mm, float limit_mm, float background_mm, float* values);
 };
 
 /// The kernels for this processor.

@@ -54,6 +54,19 @@ class Bins {
   std::vector<std::uint32_t> items_;
 };
 
+/// The tie asked for, within what `mesh` and `lattice` allow.
+double tieWithin(const Mesh& mesh, const Lattice& lattice, double asked_mm) {
+  // Far above the rounding of products and sums in double precision.
+  constexpr double rounding = 0x1p-44;
+  double greatest_mm = 0;
+  for (const Vec3d& v : mesh.vertices)
+    for (int axis = 0; axis < 3; ++axis)
+      greatest_mm = std::max(greatest_mm, std::abs(v[axis]) + std::abs(lattice.origin_mm[axis]));
+  const Vec3d& pitch_mm = lattice.pitch_mm;
+  return std::min(std::max(asked_mm, rounding * greatest_mm),
+                  std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()}) / 4);
+}
+
 /// The greatest band, in diameters, of the normals whose components are at least `least`.
 double bandAcross(const Vec3d& least, const Vec3d& pitch_mm) {
   double inverse_diameter = 1 / pitch_mm.length();
@@ -70,9 +83,10 @@ double bandAcross(const Vec3d& least, const Vec3d& pitch_mm) {
 }  // namespace
 
 MeshDistance::MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band,
-                           DistanceExtras extras, const SwallowedWalls& walls)
+                           DistanceExtras extras, const SwallowedWalls& walls, double tie_mm)
     : lattice_(lattice),
       band_(band),
+      tie_mm_(tieWithin(mesh, lattice, tie_mm)),
       extras_(extras),
       features_(mesh, walls, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers,
                 lattice.pitch_mm.y() * leaf_layers * Block::leaf_rows,
@@ -94,7 +108,7 @@ double MeshDistance::memoryBytes() const {
 /// How far along an axis a triangle can matter to a voxel: for the band's sake as `markBand` looks,
 /// a voxel more because boxes are rounded outwards.
 double MeshDistance::reachMm(int axis) const {
-  return band_.mm > 0 ? band_.mm
+  return band_.mm > 0 ? std::max(band_.mm, tie_mm_)
                       : 2 * widest_mm_ + lattice_.diagonalMm() + 2 * lattice_.pitch_mm[axis];
 }
 

@@ -54,6 +54,8 @@ struct DistanceGrids {
 /// precision of a
 ///   float, negative inside; elsewhere it is inactive and holds ±background, which is the band in
 ///   mm;
+/// - where its distance is below tieMm() its centre lies on the surface: it holds ±tied_mm, and is
+///   inside where the point shifted by (ε, ε³, ε²) is, however the surface is cut into triangles;
 /// - inside is where the winding number along the row of voxels (x) is not zero, counted by rules
 /// that agree to the bit
 ///   between neighbouring triangles: right on every closed mesh, with cavities and parts in any
@@ -70,9 +72,9 @@ class MeshDistance {
   static constexpr int chunk_layers = LeafDistances::depth * leaf_layers;
 
   /// `mesh` in mm, not used after this; no distance is measured to what `walls` hides of it.
-  /// Positions are those of the lattice.
+  /// Positions are those of the lattice. `tie_mm`: see tieMm().
   MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band, DistanceExtras extras = {},
-               const SwallowedWalls& walls = {});
+               const SwallowedWalls& walls = {}, double tie_mm = 0);
 
   /// The layers of `core`, clipped to the lattice's box. Const, in any order, from many threads at
   /// once.
@@ -83,6 +85,10 @@ class MeshDistance {
   [[nodiscard]] DistanceGrids run(ZRange core) const;
 
   [[nodiscard]] double backgroundMm() const { return band_.greatestMm(lattice_.pitch_mm); }
+
+  /// Centres nearer than this to the surface lie on it: the length asked for, but above the
+  /// rounding of the mesh's own coordinates and at most a quarter of the smallest pitch.
+  [[nodiscard]] double tieMm() const { return tie_mm_; }
 
   /// Bytes held from construction on, a copy of the mesh included.
   [[nodiscard]] double memoryBytes() const;
@@ -96,6 +102,7 @@ class MeshDistance {
 
   Lattice lattice_;
   Band band_;
+  double tie_mm_;
   DistanceExtras extras_;
   MeshFeatures features_;
   std::vector<float>

@@ -11,7 +11,6 @@
 #include <limits>
 #include <utility>
 
-#include "ops/kernels/distance/row_crossings.h"
 #include "ops/kernels/distance/row_winding.h"
 
 namespace vdbdither {
@@ -119,7 +118,7 @@ void MeshDistance::Block::enter(std::uint32_t triangle) {
   for (const int axis : {2, 1})
     if (low[axis] > high_mm_[axis] || high[axis] < low_mm_[axis]) return;
   if (all_.bounds(triangle)) {
-    visitRowCrossings({a, b, c}, pitch_mm_, voxels_, [&](const Coord& ijk, int delta) {
+    crossings_.visit({a, b, c}, voxels_, [&](const Coord& ijk, int delta) {
       work_.distances.note(work_.distances.slot(ijk >> 3), RowWinding::pack(ijk, delta));
     });
   }
@@ -249,9 +248,9 @@ void MeshDistance::Block::makeLeaf(const Coord& leaf_index, const LeafBits& insi
   }
   Leaf leaf;
   leaf.surface.reset(newLeaf<openvdb::FloatTree>(origin, 0));
-  const LeafBits active =
-      kernels_.finish(distances ? distances : far.data(), within, exists, band_mm,
-                      static_cast<float>(greatest_mm_), leaf.surface->buffer().data());
+  const LeafBits active = kernels_.finish(
+      distances ? distances : far.data(), within, exists, static_cast<float>(field_.tie_mm_),
+      band_mm, static_cast<float>(greatest_mm_), leaf.surface->buffer().data());
   const bool any_active =
       std::any_of(active.begin(), active.end(), [](std::uint64_t bits) { return bits != 0; });
   if (!any_active && !any_inside) return;
@@ -287,8 +286,9 @@ void MeshDistance::Block::addExtras(Leaf& leaf, const std::uint32_t* names) cons
       leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(all_.original(triangle));
     if (!leaf.normals) continue;
     const double distance = away.length();
-    const Vec3d normal =
-        distance < on_surface_mm ? all_.normal(triangle) : away / (*it < 0 ? -distance : distance);
+    const Vec3d normal = distance < std::max(on_surface_mm, field_.tie_mm_)
+                             ? all_.normal(triangle)
+                             : away / (*it < 0 ? -distance : distance);
     leaf.normals->buffer().data()[v] = openvdb::Vec3s(normal);
   }
 }

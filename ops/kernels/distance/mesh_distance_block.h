@@ -9,6 +9,7 @@
 
 #include "ops/kernels/distance/leaf_distances.h"
 #include "ops/kernels/distance/mesh_distance.h"
+#include "ops/kernels/distance/row_crossings.h"
 #include "ops/kernels/leaf/node_writer.h"
 
 namespace vdbdither {
@@ -65,8 +66,9 @@ class MeshDistance::Block {
         voxels_(voxels),
         leaves_(voxels.min() >> 3, voxels.max() >> 3),
         greatest_mm_(field.backgroundMm()),
-        low_mm_(voxels.min().asVec3d() * pitch_mm_ - greatest_mm_),
-        high_mm_(voxels.max().asVec3d() * pitch_mm_ + greatest_mm_),
+        low_mm_(voxels.min().asVec3d() * pitch_mm_ - std::max(greatest_mm_, field.tie_mm_)),
+        high_mm_(voxels.max().asVec3d() * pitch_mm_ + std::max(greatest_mm_, field.tie_mm_)),
+        crossings_(pitch_mm_, field.tie_mm_ / RowCrossings::tie_roundings),
         kernels_(leafKernels()),
         work_(workspace) {}
 
@@ -91,6 +93,7 @@ class MeshDistance::Block {
   openvdb::CoordBBox leaves_;
   double greatest_mm_;
   openvdb::Vec3d low_mm_, high_mm_;  ///< what may matter to the voxels
+  RowCrossings crossings_;
   const LeafKernels& kernels_;
   Workspace& work_;
 };
