@@ -9,11 +9,11 @@
 
 namespace vdbdither {
 
-/// An inactive leaf whose voxels hold `value`, with its buffer allocated.
+/// Makes an inactive leaf whose buffer is allocated but not initialized.
 template <class Tree>
-typename Tree::LeafNodeType* newLeaf(const openvdb::Coord& origin,
-                                     const typename Tree::ValueType& value) {
-  auto* leaf = new typename Tree::LeafNodeType(openvdb::PartialCreate(), origin, value, false);
+typename Tree::LeafNodeType* newLeaf(const openvdb::Coord& origin) {
+  auto* leaf = new typename Tree::LeafNodeType(openvdb::PartialCreate(), origin,
+                                               typename Tree::ValueType{}, false);
   leaf->allocate();
   return leaf;
 }
