@@ -1,4 +1,5 @@
-// The layers are made in blocks of a few rows of leaves, each from the triangles that may reach it.
+// The layers are divided into blocks of a few rows of leaves, each made from the triangles that can
+// reach it.
 
 #include "ops/kernels/distance/mesh_distance.h"
 
@@ -28,7 +29,7 @@ namespace {
 
 constexpr int edge = leaf_layers;
 
-/// The items of every bin, in the order in which they were entered.
+/// The items of every bin, in the order of the entries.
 class Bins {
  public:
   struct Entry {
@@ -67,7 +68,7 @@ double tieWithin(const Mesh& mesh, const Lattice& lattice, double asked_mm) {
                   std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()}) / 4);
 }
 
-/// The greatest band, in diameters, of the normals whose components are at least `least`.
+/// Returns the maximum band, in diameters, of the normals whose components are at least `least`.
 double bandAcross(const Vec3d& least, const Vec3d& pitch_mm) {
   double inverse_diameter = 1 / pitch_mm.length();
   double step_mm = 0;
@@ -105,15 +106,15 @@ double MeshDistance::memoryBytes() const {
          features_.memoryBytes();
 }
 
-/// How far along an axis a triangle can matter to a voxel: for the band's sake as `markBand` looks,
-/// a voxel more because boxes are rounded outwards.
+/// Returns how far along an axis a triangle can affect a voxel: as far as `Block::markBand` looks,
+/// and a voxel more because boxes are rounded outwards.
 double MeshDistance::reachMm(int axis) const {
   return band_.mm > 0 ? std::max(band_.mm, tie_mm_)
                       : 2 * widest_mm_ + lattice_.diagonalMm() + 2 * lattice_.pitch_mm[axis];
 }
 
 void MeshDistance::append(const CoordBBox& voxels, DistanceGrids& grids) const {
-  // Blocks and nodes begin together.
+  // Blocks and nodes begin at the same places.
   const int first = NodeWriter<openvdb::FloatTree>::parentOf(voxels.min()).y() / edge;
   const auto blocks =
       static_cast<std::uint32_t>(((voxels.max().y() >> 3) - first) / Block::leaf_rows + 1);
@@ -151,7 +152,7 @@ void MeshDistance::append(const CoordBBox& voxels, DistanceGrids& grids) const {
       if (grids.closest) NodeWriter<openvdb::Int32Tree>::makeParent(grids.closest->tree(), origin);
     }
   }
-  // Blocks that share nodes lie in one of these groups.
+  // Blocks that share nodes are in the same group.
   constexpr int group_rows = NodeWriter<openvdb::FloatTree>::Parent::DIM / edge;
   const std::uint32_t group_blocks = group_rows / Block::leaf_rows;
   const std::uint32_t groups = (blocks + group_blocks - 1) / group_blocks;

@@ -9,13 +9,13 @@
 
 namespace vdbdither {
 
-/// The least whole number not below x, which an int holds.
+/// Returns x rounded up. The result must fit an int.
 inline int roundedUp(double x) {
   const int towards_zero = static_cast<int>(x);
   return towards_zero + (towards_zero < x ? 1 : 0);
 }
 
-/// The greatest whole number not above x, which an int holds.
+/// Returns x rounded down. The result must fit an int.
 inline int roundedDown(double x) { return -roundedUp(-x); }
 
 /// The rows of voxel centres along x that cross triangles.
@@ -35,15 +35,15 @@ class RowCrossings {
       : pitch_mm_(pitch_mm), rounding_mm_(rounding_mm) {}
 
   /// Calls visit(ijk, delta) for every row that crosses the triangle: `ijk` is the first voxel at
-  /// or beyond the crossing, delta +1 where the row enters the solid and −1 where it leaves.
+  /// or beyond the crossing, and delta is +1 where the row enters the solid, −1 where it leaves it.
   ///
-  /// Where a plane of rows (of constant y, of which a triangle meets fewer than layers) cuts a side
-  /// is computed from the side alone, always from its lower end, so that the triangles which share
-  /// it agree to the bit: along every row the deltas of a closed mesh sum to zero, whatever the
-  /// rounding.
+  /// A triangle is cut by planes of rows of constant y, of which it meets fewer than layers. The
+  /// cut of a side is computed from the side alone, always from its lower end, so that the
+  /// triangles which share the side agree to the bit: along every row the deltas of a closed mesh
+  /// sum to zero, whatever the rounding.
   ///
   /// `corners` in mm, counter-clockwise seen from outside. Only rows of `box` are visited; a
-  /// crossing before the box counts at its first voxel, one beyond it is left out.
+  /// crossing before the box counts at the row's first voxel, one beyond the box is left out.
   template <class Visit>
   void visit(const std::array<openvdb::Vec3d, 3>& corners, const openvdb::CoordBBox& box,
              const Visit& visit) const;
