@@ -247,7 +247,7 @@ void MeshDistance::Block::makeLeaf(const Coord& leaf_index, const LeafBits& insi
     any_outside |= within[plane] != ~0ULL;
   }
   Leaf leaf;
-  leaf.surface.reset(newLeaf<openvdb::FloatTree>(origin, 0));
+  leaf.surface.reset(newLeaf<openvdb::FloatTree>(origin));
   const LeafBits active = kernels_.finish(
       distances ? distances : far.data(), within, exists, static_cast<float>(field_.tie_mm_),
       band_mm, static_cast<float>(greatest_mm_), leaf.surface->buffer().data());
@@ -274,9 +274,8 @@ void MeshDistance::Block::addExtras(Leaf& leaf, const std::uint32_t* names) cons
   };
   const Coord origin = leaf.surface->origin();
   const openvdb::Vec3s no_normal(0, 0, 0);
-  if (field_.extras_.normals)
-    give(leaf.normals, newLeaf<openvdb::Vec3STree>(origin, no_normal), no_normal);
-  if (field_.extras_.closest) give(leaf.closest, newLeaf<openvdb::Int32Tree>(origin, -1), -1);
+  if (field_.extras_.normals) give(leaf.normals, newLeaf<openvdb::Vec3STree>(origin), no_normal);
+  if (field_.extras_.closest) give(leaf.closest, newLeaf<openvdb::Int32Tree>(origin), -1);
 
   for (auto it = leaf.surface->cbeginValueOn(); it; ++it) {
     const openvdb::Index v = it.pos();
