@@ -9,11 +9,11 @@
 
 namespace vdbdither {
 
-/// Makes an inactive leaf whose buffer is allocated but not initialized.
+/// Returns an inactive leaf with its buffer allocated. The caller must set every voxel: they are
+/// not initialized.
 template <class Tree>
 typename Tree::LeafNodeType* newLeaf(const openvdb::Coord& origin) {
-  auto* leaf = new typename Tree::LeafNodeType(openvdb::PartialCreate(), origin,
-                                               typename Tree::ValueType{}, false);
+  auto* leaf = new typename Tree::LeafNodeType(openvdb::PartialCreate(), origin);
   leaf->allocate();
   return leaf;
 }

@@ -34,11 +34,19 @@ inline bool tieIsInside(const openvdb::Vec3d& outward) {
 inline int trendOfTie(const float* d, const openvdb::Vec3d& pitch_mm) {
   constexpr std::array<int, 3> strides{LeafSurroundings::stride_x, LeafSurroundings::stride_y,
                                        LeafSurroundings::stride_z};
+  constexpr int end = -1;
+  // The shorter ways serve where a whole step reaches the opposite face, on which d is zero again.
+  constexpr std::array<std::array<int, 3>, 4> ways{
+      {{0, 2, 1}, {0, 1, end}, {2, 1, end}, {1, end, end}}};
   const double here = double{*d};
-  for (const int axis : {0, 2, 1}) {
-    d += strides[static_cast<std::size_t>(axis)];
-    const double change = double{*d} - here;
-    if (std::abs(change) > 1e-3 * pitch_mm[axis]) return change < 0 ? -1 : 1;
+  for (const std::array<int, 3>& way : ways) {
+    const float* there = d;
+    for (const int axis : way) {
+      if (axis == end) break;
+      there += strides[static_cast<std::size_t>(axis)];
+      const double change = double{*there} - here;
+      if (std::abs(change) > 1e-3 * pitch_mm[axis]) return change < 0 ? -1 : 1;
+    }
   }
   return 0;
 }

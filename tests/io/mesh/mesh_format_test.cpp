@@ -34,7 +34,10 @@ class MeshFormats : public testing::TestWithParam<const MeshFormat*> {
 
 TEST_P(MeshFormats, ReadsBackWhatItWrites) {
   const Mesh mesh = floatPart();
-  expectSame(parseQuietly(written(mesh)), mesh);
+  Mesh read = parseQuietly(written(mesh));
+  // A text holds the shortest decimal that reads as the same float.
+  for (openvdb::Vec3d& vertex : read.vertices) vertex = openvdb::Vec3d(openvdb::Vec3s(vertex));
+  expectSame(read, mesh);
   EXPECT_EQ(filesUnder(scratch_.path()).size(), 1U) << "nothing else is left";
 }
 
