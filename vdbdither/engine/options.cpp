@@ -381,16 +381,13 @@ void Options::choice(std::string name, std::string& target, std::vector<Word> wo
                                     [&](const Word& word) { return word.name == target; });
     return static_cast<std::size_t>(found - words.begin());
   };
-  addWords(
-      std::move(name), Option::Kind::value, words,
-      [&target, words](std::size_t index) { target = words[index].name; }, indexOf,
-      std::move(help));
+  acceptWords(
+      add(std::move(name), Option::Kind::value, "", std::move(help)), words,
+      [&target, words](std::size_t index) { target = words[index].name; }, indexOf);
 }
 
-void Options::addWords(std::string name, Option::Kind kind, std::vector<Word> words,
-                       std::function<void(std::size_t)> set, std::function<std::size_t()> get,
-                       std::string help) {
-  Option& option = add(std::move(name), kind, "", std::move(help));
+void Options::acceptWords(Option& option, std::vector<Word> words,
+                          std::function<void(std::size_t)> set, std::function<std::size_t()> get) {
   option.words = words;
   option.set = [words, set = std::move(set)](const std::string& text) {
     for (std::size_t index = 0; index < words.size(); ++index) {
