@@ -147,7 +147,7 @@ class ArgumentReader {
 
  private:
   std::string next() {
-    const std::string word = rest_.front();
+    std::string word = rest_.front();
     rest_ = rest_.subspan(1);
     return word;
   }
@@ -381,9 +381,9 @@ void Options::choice(std::string name, std::string& target, std::vector<Word> wo
                                     [&](const Word& word) { return word.name == target; });
     return static_cast<std::size_t>(found - words.begin());
   };
-  acceptWords(
-      add(std::move(name), Option::Kind::value, "", std::move(help)), words,
-      [&target, words](std::size_t index) { target = words[index].name; }, indexOf);
+  const auto take = [&target, words](std::size_t index) { target = words[index].name; };
+  acceptWords(add(std::move(name), Option::Kind::value, "", std::move(help)), std::move(words),
+              take, indexOf);
 }
 
 void Options::acceptWords(Option& option, std::vector<Word> words,
@@ -397,7 +397,7 @@ void Options::acceptWords(Option& option, std::vector<Word> words,
     for (const Word& word : words) names.push_back(word.name);
     throw UsageError("'" + text + "' is not accepted; choose " + alternatives(names));
   };
-  option.get = [words, get = std::move(get)] {
+  option.get = [words = std::move(words), get = std::move(get)] {
     const std::size_t index = get();
     return index < words.size() ? Texts{words[index].name} : Texts{};
   };
