@@ -55,7 +55,7 @@ class Hollow : public Filter {
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
-    return {{surface_grid, Reach::point()}};
+    return {{surface_grid, Reach::stencil(1)}};
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
@@ -64,7 +64,7 @@ class Hollow : public Filter {
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     return {{surface_grid, hollowed(*findGrid<FloatGrid>(in.grids, surface_grid), lattice_,
-                                    thickness_mm_, drains_, background_mm_, in.core)}};
+                                    thickness_mm_, drains_, background_mm_, in.core, in.valid)}};
   }
 
  private:

@@ -159,7 +159,12 @@ class SurfaceMeasurement {
   }
 
   /// Makes every check that does not need the surface, and reads the reference.
-  void begin(Reporter& reporter) {
+  /// `lattice`: the surface's, or null.
+  void begin(const Lattice* lattice, Reporter& reporter) {
+    if (placement_.on_bed && lattice == nullptr)
+      throw UsageError(
+          "--place: the bed is a face of a lattice's voxels, and a mesh has no lattice; measure a "
+          ".vdb");
     if (!report_file_.empty())
       StagedOutput::check(report_file_, StagedOutput::Kind::file, overwrite_.overwrite);
     if (!map_file_.empty()) {
@@ -169,7 +174,7 @@ class SurfaceMeasurement {
                          colouredEndings() + " file");
       MeshWriter::check(map_file_, overwrite_.overwrite);
     }
-    readReference(reporter);
+    readReference(lattice, reporter);
   }
 
   [[nodiscard]] const SurfaceGridOption& surfaceGrid() const { return surface_grid_; }
@@ -221,10 +226,12 @@ class SurfaceMeasurement {
   }
 
  private:
-  void readReference(Reporter& reporter) {
+  void readReference(const Lattice* lattice, Reporter& reporter) {
     Mesh mesh = readMesh(reference_file_, [&](const std::string& text) { reporter.warn(text); });
     const MeshPlacementOptions& given = placement_;
-    place(mesh, {given.rotate_degrees, given.mmPerUnit(), given.fit_mm.value_or(0), given.on_bed});
+    MeshPlacement placement{given.rotate_degrees, given.mmPerUnit(), given.fit_mm.value_or(0)};
+    if (given.on_bed) placement.corner_mm = bedCornerMm(*lattice);
+    place(mesh, placement);
     // Errors are measured to the triangles given, so that nothing is guessed in their place.
     SolidMesh solid = solidMesh(std::move(mesh), {.guess = false, .find_walls = false});
     if (solid.mesh.triangles.empty())
@@ -312,7 +319,7 @@ class Measure : public Sink {
     lattice_ = in.lattice;
     surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
     components_.emplace(surface_->layout());
-    measurement_.begin(report());
+    measurement_.begin(&lattice_, report());
   }
 
   [[nodiscard]] bool isBarrier() const override { return true; }
@@ -357,7 +364,7 @@ class MeasureMesh : public Tool {
   }
 
   void run() override {
-    measurement_.begin(report());
+    measurement_.begin(nullptr, report());
     Mesh mesh = readMesh(file_, [this](const std::string& text) { report().warn(text); });
     if (measurement_.smooths()) checkClosed(mesh);
     measurement_.finish(std::move(mesh), file_, nullptr, nullptr, report());

@@ -53,17 +53,16 @@ class MeshToSdf : public Source {
     const Vec3d pitch_mm = targetPitchMm(target_, schema);
     held_band_mm_ = band_.leastMm(pitch_mm);
     std::vector<Mesh> meshes = readMeshes();
-    place(meshes, {placement_.rotate_degrees, placement_.mmPerUnit(), placement_.fit_mm.value_or(0),
-                   placement_.on_bed});
+    const double tie_mm = placed(meshes, pitch_mm);
     questionSize(meshes, schema);
     const SolidBodies solids = solidsOf(std::move(meshes));
     schema.lattice = latticeOfMesh(solids.whole.mesh, pitch_mm);  // a guess may be larger
     const Lattice& lattice = schema.lattice;
     for (const SolidMesh& part : solids.bodies)
-      parts_.emplace_back(part.mesh, lattice, band_, DistanceExtras{}, part.walls);
+      parts_.emplace_back(part.mesh, lattice, band_, DistanceExtras{}, part.walls, tie_mm);
     countLeaves(solids.whole.mesh, schema);
     field_ = std::make_unique<MeshDistance>(solids.whole.mesh, lattice, band_, extras_,
-                                            solids.whole.walls);
+                                            solids.whole.walls, tie_mm);
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
@@ -94,6 +93,20 @@ class MeshToSdf : public Source {
   }
 
  private:
+  /// Moves the meshes to where they are printed. Returns the length that their files leave open of
+  /// a position, mm: most files hold coordinates in single precision.
+  double placed(std::vector<Mesh>& meshes, const Vec3d& pitch_mm) const {
+    constexpr double open = 0x1p-20;
+    const MeshBounds bounds = boundsOf(meshes);
+    double greatest = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      greatest = std::max({greatest, std::abs(bounds.min[axis]), std::abs(bounds.max[axis])});
+    MeshPlacement placement{placement_.rotate_degrees, placement_.mmPerUnit(),
+                            placement_.fit_mm.value_or(0)};
+    if (placement_.on_bed) placement.corner_mm = bedCornerMm({pitch_mm, Vec3d(0.0), {}});
+    return open * greatest * place(meshes, placement);
+  }
+
   static Band bandFrom(const std::string& text) {
     constexpr Range diameters = Range::above(0, 1000);
     constexpr Range lengths_mm = Range::above(0, 1000);

@@ -11,6 +11,7 @@
 #include "io/vdb/vdb.h"
 #include "ops/kernels/distance/zero_set_distance.h"
 #include "ops/kernels/leaf/held_band.h"
+#include "ops/kernels/mesh/mesh_placement.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
@@ -207,7 +208,7 @@ class Resample : public Source {
       throw DataError("grid '" + grid_name_ + "' has no surface: none of its values pass " +
                       shortestText(double{reading.level}) + "; check --kind and --level");
     if (!placement_.on_bed) return surface;
-    map.postTranslate(-surface->bounds().min);
+    map.postTranslate(bedCornerMm({pitch_mm, Vec3d(0.0), {}}) - surface->bounds().min);
     return made(map);
   }
 

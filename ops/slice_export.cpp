@@ -38,7 +38,11 @@ class SliceExport : public Sink {
     options.text("prefix", names_.prefix, "TEXT", "Beginning of the file names");
     options.integer("digits", names_.digits, {1, 9},
                     "Digits of the number of a slice, with zeros in front");
-    options.integer("first", names_.first, {0, 1000000}, "Number of the lowest layer");
+    options.integer("first", names_.first, {0, 1000000}, "Number of the lowest slice");
+    options.flag(
+        "keep-blank", keep_blank_,
+        "Writes the blank slices below and above the part too, which pieces of a job need to be "
+        "numbered alike; exr always has them");
     options.integer("padding", stack_.layout.padding, {0, 100000},
                     "Empty voxels added on each side in x and y");
     options.flag(
@@ -95,7 +99,7 @@ class SliceExport : public Sink {
   }
 
   void write(const Slab& in) override {
-    if (!writer_) writer_.emplace(folder_, stack_, names_, *encoder_);
+    if (!writer_) writer_.emplace(folder_, stack_, names_, *encoder_, keep_blank_);
     const int together =
         leaf_layers * ((tbb::this_task_arena::max_concurrency() + leaf_layers - 1) / leaf_layers);
     for (int z = in.core.begin; z < in.core.end;) {
@@ -198,6 +202,7 @@ class SliceExport : public Sink {
   std::string format_name_ = "png";
   std::string background_ = "0,0,0,255";
   SliceNames names_{"slice_", 5, 0};
+  bool keep_blank_ = false;
   OverwriteOption overwrite_;
   std::map<const SliceFormat*, std::unique_ptr<SliceEncoder>> encoders_;
 

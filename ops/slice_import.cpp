@@ -129,7 +129,7 @@ class SliceImport : public Source {
 
   /// Layers are asked for in whole leaves, so of a stack that does not end at one some are left.
   void checkCovered(ZRange core) const {
-    const ZRange stored = stack_->manifest().layers;
+    const ZRange stored = stack_->manifest().knownLayers();
     if (intersection(core, stored) == core || core.empty()) return;
     const ZRange all = stack_->manifest().lattice.layers();
     ZRange whole = stored;

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes a dithered slice stack in out/ from the sample part, or from a mesh (STL, OBJ or PLY).
+# Makes a dithered slice stack in out/ from the sample part, or from a mesh (OBJ, OFF, PLY or STL).
 #
 #     samples/run.sh [MESH]
 set -euo pipefail

@@ -35,6 +35,10 @@ Manifest manifestOf(const ordered_json& json) {
                      json.at("flip_y")};
   manifest.layers.begin = json.at("first_layer");
   manifest.layers.end = manifest.layers.begin + json.at("size").at(2).get<int>();
+  if (json.contains("cropped")) {
+    manifest.cropped_below = json["cropped"].at("below");
+    manifest.cropped_above = json["cropped"].at("above");
+  }
   manifest.background = json.at("background");
   for (const ordered_json& entry : json.at("materials"))
     manifest.materials.push_back({entry.at("name"), entry.at("rgba")});
@@ -63,6 +67,7 @@ std::string textOf(const Manifest& manifest) {
   json["origin_mm"] = jsonOf(lattice.origin_mm);
   json["size"] = {layout.width(), layout.height(), manifest.layers.size()};
   json["first_layer"] = manifest.layers.begin;
+  json["cropped"] = {{"below", manifest.cropped_below}, {"above", manifest.cropped_above}};
   json["box"] = {{"min", jsonOf(lattice.box.min())}, {"max", jsonOf(lattice.box.max())}};
   json["padding"] = layout.padding;
   json["flip_x"] = layout.flip_x;
@@ -103,7 +108,8 @@ Manifest readManifest(const StackInput& stack) {
       throw DataError(shown + ": pitch_mm is not above zero" + make_stack_again);
   }
   if (lattice.box.empty() || manifest.layout.padding < 0 || manifest.layers.empty() ||
-      intersection(manifest.layers, lattice.layers()) != manifest.layers) {
+      manifest.cropped_below < 0 || manifest.cropped_above < 0 ||
+      intersection(manifest.knownLayers(), lattice.layers()) != manifest.knownLayers()) {
     throw DataError(shown + ": box, padding and layers do not fit together" + make_stack_again);
   }
   return manifest;

@@ -33,7 +33,14 @@ struct Manifest {
   MaterialTable materials;
   std::vector<std::uint64_t> voxels;  ///< of each material; not read back
   ZRange layers;                      ///< the ones that the stack holds
+  int cropped_below = 0;              ///< blank layers below these that were left out
+  int cropped_above = 0;              ///< and above
   std::vector<Slice> slices;          ///< in rising layers
+
+  /// The layers whose voxels are known.
+  [[nodiscard]] ZRange knownLayers() const {
+    return {layers.begin - cropped_below, layers.end + cropped_above};
+  }
 };
 
 /// The end of a refusal that names the remedy.

@@ -363,4 +363,16 @@ std::vector<SpanImage> sliceSpans(const openvdb::BoolGrid& grid, const SliceLayo
   return slice(grid, layout, layers);
 }
 
+SpanImage blankSlice(const SliceLayout& layout) {
+  SpanImage image{layout.width(), layout.height(), {}, {}};
+  for (std::uint32_t y = 0; y <= image.height; ++y) image.row_begin.push_back(y);
+  image.spans.assign(image.height, {image.width, 0});
+  return image;
+}
+
+bool isBlank(const SpanImage& slice) {
+  return std::all_of(slice.spans.begin(), slice.spans.end(),
+                     [](const Span& span) { return span.value == 0; });
+}
+
 }  // namespace vdbdither

@@ -30,6 +30,12 @@ std::vector<SpanImage> sliceSpans(const openvdb::Int32Grid& grid, const SliceLay
 std::vector<SpanImage> sliceSpans(const openvdb::BoolGrid& grid, const SliceLayout& layout,
                                   ZRange layers);
 
+/// A slice without a voxel.
+SpanImage blankSlice(const SliceLayout& layout);
+
+/// Whether no voxel of it is printed.
+bool isBlank(const SpanImage& slice);
+
 /// The way back: a grid whose layers are the pictures `images`, the first one of them the layer
 /// `layers.begin`; 0 is inactive. What lies outside the layout's box is left out. In canonical
 /// form.

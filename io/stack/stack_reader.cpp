@@ -19,13 +19,6 @@ std::string colourText(std::uint32_t colour) {
   return text;
 }
 
-SpanImage blank(std::uint32_t width, std::uint32_t height) {
-  SpanImage image{width, height, {}, {}};
-  for (std::uint32_t y = 0; y <= height; ++y) image.row_begin.push_back(y);
-  image.spans.assign(height, {width, 0});
-  return image;
-}
-
 /// Puts `value` where `mask` is not 0. Returns where something else is already: the row, or -1.
 int overlay(SpanImage& image, const SpanImage& mask, std::uint32_t value) {
   SpansBuilder merged(image.width);
@@ -131,8 +124,9 @@ std::map<std::uint32_t, std::uint32_t> StackReader::meaningsOfPixels() const {
 }
 
 SpanImage StackReader::layer(int z) const {
+  if (!manifest_.layers.contains(z)) return blankSlice(manifest_.layout);
   if (format_->pixel != SlicePixel::one_material) return read(*find(z, ""));
-  SpanImage all = blank(manifest_.layout.width(), manifest_.layout.height());
+  SpanImage all = blankSlice(manifest_.layout);
   for (std::uint32_t i = 1; i <= manifest_.materials.size(); ++i) {
     const Manifest::Slice& slice = *find(z, manifest_.materials[i - 1].name);
     const int row = overlay(all, read(slice), i);

@@ -24,8 +24,9 @@ class StackReader {
   [[nodiscard]] const Manifest& manifest() const { return manifest_; }
   [[nodiscard]] const SliceFormat& format() const { return *format_; }
 
-  /// Returns the index of the material of every voxel of layer `z`; of a format that does not tell
-  /// materials apart 1 for each. Safe to call from many threads. Throws DataError.
+  /// Returns the index of the material of every voxel of layer `z`, one of the known layers; of a
+  /// format that does not tell materials apart 1 for each. Safe to call from many threads. Throws
+  /// DataError.
   [[nodiscard]] SpanImage layer(int z) const;
 
  private:

@@ -32,10 +32,12 @@ struct StackWriter::Layer {
 };
 
 StackWriter::StackWriter(const std::filesystem::path& target, Manifest stack, SliceNames names,
-                         const SliceEncoder& encoder)
+                         const SliceEncoder& encoder, bool keep_blank)
     : stack_(std::move(stack)),
       names_(std::move(names)),
       encoder_(encoder),
+      keep_blank_(keep_blank || !encoder.reads().empty()),
+      lowest_(stack_.lattice.layers().begin),
       output_(target),
       preview_(stack_.lattice.pitch_mm, stack_.layout.width(), stack_.layout.height(),
                stack_.lattice.layers(), displayColours(stack_.materials)) {
@@ -43,12 +45,36 @@ StackWriter::StackWriter(const std::filesystem::path& target, Manifest stack, Sl
 }
 
 void StackWriter::add(ZRange layers, std::vector<SpanImage> images, const Grids& grids) {
-  // They are kept here, for TBB forgets what is on its way when one of the steps fails.
-  std::vector<Layer> all(images.size());
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    all[i].z = layers.begin + static_cast<int>(i);
-    all[i].image = std::move(images[i]);
+  if (known_.empty()) known_ = {layers.begin, layers.begin};
+  if (layers.begin != known_.end) {
+    throw DataError("layers " + std::to_string(known_.end) + " to " +
+                    std::to_string(layers.begin - 1) + " are missing");
   }
+  known_.end = layers.end;
+  std::vector<Layer> ready;
+  for (int z = layers.begin; z < layers.end; ++z) {
+    SpanImage& image = images[static_cast<std::size_t>(z - layers.begin)];
+    if (!keep_blank_ && isBlank(image)) {
+      ++waiting_;
+      continue;
+    }
+    if (stack_.layers.empty() && ready.empty() && beginsAtBottom()) {
+      stack_.cropped_below = std::exchange(waiting_, 0);
+      lowest_ = z;
+    }
+    release(z, ready);
+    ready.push_back({z, std::move(image), {}, {}, {}});
+  }
+  encodeAll(std::move(ready), grids);
+}
+
+void StackWriter::release(int end, std::vector<Layer>& layers) {
+  for (int z = end - std::exchange(waiting_, 0); z < end; ++z)
+    layers.push_back({z, blankSlice(stack_.layout), {}, {}, {}});
+}
+
+// The layers are kept here, for TBB forgets what is on its way when one of the steps fails.
+void StackWriter::encodeAll(std::vector<Layer> all, const Grids& grids) {
   std::size_t next = 0;
   const auto take = [&](tbb::flow_control& control) -> Layer* {
     if (next < all.size()) return &all[next++];
@@ -71,13 +97,20 @@ void StackWriter::add(ZRange layers, std::vector<SpanImage> images, const Grids&
 }
 
 const Manifest& StackWriter::finish() {
+  if (!stack_.layers.empty() && known_.end == stack_.lattice.layers().end) {
+    stack_.cropped_above = waiting_;
+  } else {
+    std::vector<Layer> blank;
+    release(known_.end, blank);
+    encodeAll(std::move(blank), {});
+  }
   encoder_.finish(stack_, preview_.picture(), output_);
   output_.commit();
   return stack_;
 }
 
 std::string StackWriter::nameOf(int z) const {
-  std::string number = std::to_string(names_.first + z - stack_.lattice.box.min().z());
+  std::string number = std::to_string(names_.first + z - lowest_);
   if (number.size() < static_cast<std::size_t>(names_.digits))
     number.insert(0, names_.digits - number.size(), '0');
   return names_.prefix + number;
@@ -108,10 +141,6 @@ std::vector<std::uint64_t> StackWriter::countedVoxels(const Layer& layer) const 
 
 void StackWriter::store(Layer& layer) {
   if (stack_.layers.empty()) stack_.layers = {layer.z, layer.z};
-  if (layer.z != stack_.layers.end) {
-    throw DataError("layers " + std::to_string(stack_.layers.end) + " to " +
-                    std::to_string(layer.z - 1) + " are missing");
-  }
   ++stack_.layers.end;
   for (std::size_t i = 0; i < layer.files.size(); ++i) {
     const SliceFile& file = layer.files[i];

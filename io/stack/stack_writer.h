@@ -14,7 +14,7 @@ namespace vdbdither {
 struct SliceNames {
   std::string prefix;
   int digits = 1;  ///< of the number, with zeros in front
-  int first = 0;   ///< number of the lowest layer of the lattice
+  int first = 0;   ///< number of the lowest slice of a job that begins at the lattice's bottom
 };
 
 /// Writes a stack of slices, layer by layer. It exists under its name once it is complete.
@@ -22,9 +22,12 @@ class StackWriter {
  public:
   /// @param stack    all but its layers, slices and voxels
   /// @param encoder  planned with the same; must outlive the writer
+  /// @param keep_blank  false: blank layers next to the lattice's bottom and top are left out,
+  /// unless
+  ///                    no layer has a voxel or the encoder reads other grids
   /// Throws DataError.
   StackWriter(const std::filesystem::path& target, Manifest stack, SliceNames names,
-              const SliceEncoder& encoder);
+              const SliceEncoder& encoder, bool keep_blank);
 
   /// Adds layers, which follow on those before.
   /// @param images  of each of the layers, the index of the material of each voxel
@@ -40,6 +43,12 @@ class StackWriter {
   struct Layer;
 
   [[nodiscard]] std::string nameOf(int z) const;
+  [[nodiscard]] bool beginsAtBottom() const {
+    return known_.begin == stack_.lattice.layers().begin;
+  }
+  /// Moves the blank layers that wait, which end at `end`, to `layers`.
+  void release(int end, std::vector<Layer>& layers);
+  void encodeAll(std::vector<Layer> layers, const Grids& grids);
   void encode(Layer& layer, const Grids& grids) const;
   [[nodiscard]] std::vector<std::uint64_t> countedVoxels(const Layer& layer) const;
   void store(Layer& layer);
@@ -47,6 +56,10 @@ class StackWriter {
   Manifest stack_;
   SliceNames names_;
   const SliceEncoder& encoder_;
+  bool keep_blank_;
+  ZRange known_;     ///< the layers that came
+  int waiting_ = 0;  ///< the last blank ones of these
+  int lowest_;       ///< the layer that is number `first`
   StackOutput output_;
   StackPreview preview_;
 };

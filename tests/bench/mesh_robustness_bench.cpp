@@ -38,7 +38,7 @@ struct Part {
 Part partOf(const std::filesystem::path& path) {
   Part part;
   part.raw = readMesh(path, {});
-  place(part.raw, {.fit_mm = 50, .on_bed = true});
+  place(part.raw, {.fit_mm = 50, .corner_mm = openvdb::Vec3d(0.0)});
   part.solid = solidMesh(part.raw);
   part.oriented = part.solid.mesh;
   if (part.solid.report.is_guess) {

@@ -74,12 +74,27 @@ class Chain(ProgramTest):
     def test_a_layer_range_gives_exactly_those_slices(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(1.2))
         stages = " ! ".join(self.chain("mimaki-3duj-553", "part.stl"))
-        whole = self.sums(f"vdbdither {stages} ! slice-export out")
+        whole = self.sums(f"vdbdither {stages} ! slice-export out --keep-blank")
         for begin, end in ((0, 1), (13, 45), (32, 40), (len(whole) - 3, len(whole))):
-            part = self.sums(f"vdbdither {stages} ! slice-export out --layers {begin}:{end}")
+            part = self.sums(f"vdbdither {stages} ! slice-export out --keep-blank --layers {begin}:{end}")
             self.assertEqual(part, whole[begin:end], (begin, end))
-            piped = self.sums(f"{stages.replace('!', '|')} | slice-export out --layers {begin}:{end}")
+            piped = self.sums(f"{stages.replace('!', '|')} | slice-export out --keep-blank --layers {begin}:{end}")
             self.assertEqual(piped, whole[begin:end], (begin, end))
+
+    def test_a_placed_part_as_high_as_ten_layers_is_ten_slices(self):
+        pitch = (0.042, 0.084, 0.022)
+        meshes.write_stl(self.folder / "plate.stl", meshes.box([10 * step for step in pitch], (3.3, -1.7, 5)))
+        self.succeed("mesh2sdf", "plate.stl", "--printer", "mimaki-3duj-553", "--place", "!", "dither", "--mask", "none",
+                     "!", "slice-export", "out")
+        manifest = json.loads((self.folder / "out/manifest.json").read_text())
+        self.assertEqual(manifest["size"][2], 10)
+        self.assertEqual(manifest["first_layer"], 0)
+        self.assertEqual(manifest["materials"][0]["voxels"], 1000)
+        self.assertEqual(manifest["cropped"]["below"], -manifest["box"]["min"][2])
+        self.assertEqual(manifest["cropped"]["above"], manifest["box"]["max"][2] - 9)
+        # What was left out is blank when it is read back.
+        self.succeed("slice-import", "out", "-o", "again.vdb")
+        self.succeed("run", "mesh2sdf plate.stl --printer mimaki-3duj-553 --place ! dither --mask none ! compare again.vdb --grids solid")
 
     @unittest.skipUnless("VDBDITHER_MODELS" in os.environ, "VDBDITHER_MODELS is not set to a folder of models")
     def test_every_way_agrees_on_a_scan_of_40_mm(self):

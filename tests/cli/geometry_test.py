@@ -62,10 +62,10 @@ class Geometry(ProgramTest):
         self.box("high.stl", (1, 1, 1), (0, 0, 2))
         self.succeed("mesh2sdf", "high.stl", *MIMAKI, "-o", "high.vdb")
         chain = "mesh2sdf low.stl --printer mimaki-3duj-553 ! csg --union high.vdb ! normals"
-        self.shell(f"vdbdither {chain} ! {SLICES}")
+        self.shell(f"vdbdither {chain} ! {SLICES} --keep-blank")
         whole = stack.sums(self.folder / "out")
         for begin, end in ((0, 9), (40, 70), (100, len(whole))):
-            self.shell(f"vdbdither {chain} ! {SLICES} --layers {begin}:{end}")
+            self.shell(f"vdbdither {chain} ! {SLICES} --keep-blank --layers {begin}:{end}")
             self.assertEqual(stack.sums(self.folder / "out"), whole[begin:end])
 
     def test_the_second_operand_may_be_a_named_pipe(self):

@@ -1,5 +1,6 @@
 """Manuals and completion, which are made from the declarations of operators."""
 
+import re
 import shutil
 import subprocess
 import unittest
@@ -29,6 +30,14 @@ class Manual(ProgramTest):
         self.assertEqual(sorted(made), sorted(kept), "renew them: cmake --build build/release --target docs")
         for name, text in made.items():
             self.assertEqual(kept[name], text, f"{name} is stale; renew it: cmake --build build/release --target docs")
+
+    def test_the_page_on_formats_shows_them_as_they_are(self):
+        page = (ROOT / "docs/writing-a-format.md").read_text()
+        sources = [(ROOT / "io" / name).read_text() for name in ("mesh/off.cpp", "stack/png8.cpp")]
+        pieces = re.findall(r"```cpp\n(.*?)```", page, re.DOTALL)
+        self.assertGreater(len(pieces), 5)
+        for piece in pieces:
+            self.assertTrue(any(piece in source for source in sources), piece)
 
     def test_every_verb_has_a_manual_page_that_man_accepts(self):
         self.succeed("docs", "man", "man")

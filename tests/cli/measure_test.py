@@ -62,7 +62,7 @@ class MeasureTest(ProgramTest):
 
     def test_a_chain_needs_a_surface_and_a_reference(self):
         chain = ("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "--mask", "white", "!")
-        self.refuse(2, "measure: --reference is missing", *chain, "measure")
+        self.refuse(2, "measure: '--reference' is missing", *chain, "measure")
         self.refuse(1, "mesh-export: no grid 'printed'; there is 'solid' 'surface'", *chain, "mesh-export", "a.stl",
                     "--grid", "printed")
 

@@ -46,7 +46,7 @@ class Printers(ProgramTest):
         self.refuse(2, "printers: action: 'sell' is not accepted; choose list, show or check", "printers", "sell")
         self.refuse(2, "printers: 'printer' is missing; see --help", "printers", "show")
         self.refuse(2, "printers: 'x' is not expected; printers show x describes it", "printers", "list", "x")
-        self.refuse(2, "no operator or command 'printer'; did you mean 'printers'?", "printer")
+        self.refuse(2, "no operator or tool 'printer'; did you mean 'printers'?", "printer")
 
 
 if __name__ == "__main__":

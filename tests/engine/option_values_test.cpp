@@ -48,6 +48,7 @@ TEST(OptionValues, RangesAreToldInWords) {
   EXPECT_EQ((Range{0.01, 1}).text("mm"), "from 0.01 mm to 1 mm");
   EXPECT_EQ((Range{.min = 0}).text("mm"), "0 mm or greater");
   EXPECT_EQ((Range{.max = 4}).text(), "4 or less");
+  EXPECT_EQ((Range{1e-6, 1e6}).text(), "from 1e-06 to 1000000");
   EXPECT_EQ(Range::above(0).text("mm"), "greater than 0 mm");
   EXPECT_EQ(Range::above(0, 5).text(), "greater than 0, up to 5");
 }

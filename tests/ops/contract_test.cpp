@@ -7,6 +7,7 @@
 
 #include "io/vdb/vdb.h"
 #include "tests/support/mesh_files.h"
+#include "tests/support/png_reader.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/engine/chain.h"

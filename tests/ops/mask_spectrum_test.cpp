@@ -93,7 +93,9 @@ TEST(MaskSpectrum, RefusesWhatHasNoSpectrum) {
   EXPECT_EQ(refusal(quick(file)), "no grid 'mask'; there is none");
   schema.grids["mask"] = openvdb::FloatGrid::create(0.5f);
   EXPECT_EQ(refusal(quick(file)), "the mask is constant: it has no spectrum");
-  EXPECT_EQ(refusal({"--pitch", "1,0,1", file}), "--pitch: 0 is no pitch; more than 0 mm is");
+  EXPECT_EQ(refusal({"--pitch", "1,0,1", file}),
+            "--pitch: '1,0,1' is not accepted; the value must be one length or three, separated by "
+            "commas, each greater than 0 mm, up to 1000000 mm");
   schema.lattice.box = openvdb::CoordBBox(Coord(0, 0, 0), Coord(7, 300, 7));
   EXPECT_EQ(refusal(quick(file)), "the mask is 301 voxels long; tiles of up to 256 are looked at");
   schema.lattice.box = openvdb::CoordBBox();

@@ -164,7 +164,7 @@ TEST_F(SliceImport, AStackOfSolidHasNoMaterials) {
 }
 
 TEST_F(SliceImport, WarnsOnceOfSlicesThatWereEdited) {
-  exported(job(), {scratch_ / "out"});
+  exported(job(), {scratch_ / "out", "--keep-blank"});
   const SpanImage blank = test::spanImage(182, 154, [](int, int) { return 0U; });
   const std::vector<std::uint32_t> palette = {rgba(0, 0, 0)};
   for (const char* name : {"out/slice_00003.png", "out/slice_00004.png"})
@@ -189,7 +189,7 @@ TEST_F(SliceImport, RefusesAStackThatIsNoneOrLacksSlices) {
   std::ofstream(scratch_ / "empty/manifest.json") << "{}";
   EXPECT_THAT([&] { Import(scratch_ / "empty").source().plan(); },
               ThrowsMessage<DataError>(HasSubstr("is not a manifest of slice-export: ")));
-  exported(job(), {scratch_ / "out"});
+  exported(job(), {scratch_ / "out", "--keep-blank"});
   fs::remove(scratch_ / "out/slice_00012.png");
   EXPECT_THAT([&] { Import(scratch_ / "out").source().plan(); },
               ThrowsMessage<DataError>("the slice '" + (scratch_ / "out/slice_00012.png").string() +
@@ -198,7 +198,7 @@ TEST_F(SliceImport, RefusesAStackThatIsNoneOrLacksSlices) {
 }
 
 TEST_F(SliceImport, RefusesSlicesOfOtherSizesAndUnknownColours) {
-  exported(job(), {scratch_ / "out"});
+  exported(job(), {scratch_ / "out", "--keep-blank"});
   const auto whole = [&] {
     Import import(scratch_ / "out");
     const Schema schema = import.source().plan();

@@ -299,8 +299,8 @@ std::string overview() {
   }
   return text +
          "\nOperators read and write .vdb: -i and -o name files, pipes carry layers, ! joins\n"
-         "operators in one process. A chain begins with a source or a .vdb (read), and ends\n"
-         "with a sink or -o (write).\n\n"
+         "operators in one process. A chain begins with a source or a .vdb (read), and\n"
+         "ends with a sink or -o (write).\n\n"
          "Example: vdbdither mesh2sdf part.stl --printer mimaki-3duj-553 ! dither !\n"
          "           material-assign ! slice-export out\n";
 }

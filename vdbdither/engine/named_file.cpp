@@ -73,7 +73,7 @@ std::string takeNamedFile(std::vector<std::string>& arguments, const OperatorInf
                           const Options& own, const Options& common) {
   const std::vector<std::size_t> words = plainWords(arguments, own, common);
   if (words.empty()) return "";
-  const std::string first = arguments[words.front()];
+  std::string first = arguments[words.front()];
   if (words.size() <= ownWords(own)) {
     if (!isVdb(first) || info.names_vdb) return "";
   } else {

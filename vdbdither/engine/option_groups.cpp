@@ -24,7 +24,8 @@ void declareSize(PlacementOptions& placement, Options& options, const std::strin
 
 void declareBed(PlacementOptions& placement, Options& options, const std::string& part) {
   options.flag("place", placement.on_bed,
-               "Moves " + part + " to the bed: its bounding box begins at the origin");
+               "Moves " + part +
+                   " to the bed: its bounding box begins at the lower faces of voxel (0, 0, 0)");
 }
 
 }  // namespace

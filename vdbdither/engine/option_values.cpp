@@ -62,6 +62,12 @@ std::size_t editDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+/// Whole numbers up to a thousand millions without an exponent.
+std::string boundText(double bound) {
+  const bool is_short = std::abs(bound) <= 1e9 && bound == std::floor(bound);
+  return is_short ? std::to_string(static_cast<long>(bound)) : shortestText(bound);
+}
+
 bool isControl(char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; }
 
 std::string escaped(std::string_view word) {
@@ -86,7 +92,7 @@ bool Range::contains(double value) const {
 
 std::string Range::text(std::string_view unit) const {
   const auto with_unit = [&](double bound) {
-    return shortestText(bound) + (unit.empty() ? "" : " ") + std::string(unit);
+    return boundText(bound) + (unit.empty() ? "" : " ") + std::string(unit);
   };
   const bool has_min = std::isfinite(min);
   const bool has_max = std::isfinite(max);

@@ -147,7 +147,7 @@ class ArgumentReader {
 
  private:
   std::string next() {
-    const std::string word = rest_.front();
+    std::string word = rest_.front();
     rest_ = rest_.subspan(1);
     return word;
   }
@@ -381,16 +381,13 @@ void Options::choice(std::string name, std::string& target, std::vector<Word> wo
                                     [&](const Word& word) { return word.name == target; });
     return static_cast<std::size_t>(found - words.begin());
   };
-  addWords(
-      std::move(name), Option::Kind::value, words,
-      [&target, words](std::size_t index) { target = words[index].name; }, indexOf,
-      std::move(help));
+  const auto take = [&target, words](std::size_t index) { target = words[index].name; };
+  acceptWords(add(std::move(name), Option::Kind::value, "", std::move(help)), std::move(words),
+              take, indexOf);
 }
 
-void Options::addWords(std::string name, Option::Kind kind, std::vector<Word> words,
-                       std::function<void(std::size_t)> set, std::function<std::size_t()> get,
-                       std::string help) {
-  Option& option = add(std::move(name), kind, "", std::move(help));
+void Options::acceptWords(Option& option, std::vector<Word> words,
+                          std::function<void(std::size_t)> set, std::function<std::size_t()> get) {
   option.words = words;
   option.set = [words, set = std::move(set)](const std::string& text) {
     for (std::size_t index = 0; index < words.size(); ++index) {
@@ -400,7 +397,7 @@ void Options::addWords(std::string name, Option::Kind kind, std::vector<Word> wo
     for (const Word& word : words) names.push_back(word.name);
     throw UsageError("'" + text + "' is not accepted; choose " + alternatives(names));
   };
-  option.get = [words, get = std::move(get)] {
+  option.get = [words = std::move(words), get = std::move(get)] {
     const std::size_t index = get();
     return index < words.size() ? Texts{words[index].name} : Texts{};
   };

@@ -109,17 +109,17 @@ class Options {
 
   /// One of `choices`.
   template <typename E, std::size_t n>
-  void choice(std::string name, E& target, const std::array<Choice<E>, n>& choices,
-              std::string help) {
-    addChoice(std::move(name), Option::Kind::value, target, choices, std::move(help));
+  void choice(const std::string& name, E& target, const std::array<Choice<E>, n>& choices,
+              const std::string& help) {
+    addChoice(name, Option::Kind::value, target, choices, help);
   }
   /// One of the words of a table that is known at run time only.
   void choice(std::string name, std::string& target, std::vector<Word> words, std::string help);
   /// One of `choices`, or another text, which names a file: `target` becomes `other` then.
   template <typename E, std::size_t n>
-  void choiceOrFile(std::string name, E& target, const std::array<Choice<E>, n>& choices, E other,
-                    std::string& path, std::string value, std::string help) {
-    addChoice(std::move(name), Option::Kind::value, target, choices, std::move(help));
+  void choiceOrFile(const std::string& name, E& target, const std::array<Choice<E>, n>& choices,
+                    E other, std::string& path, std::string value, const std::string& help) {
+    addChoice(name, Option::Kind::value, target, choices, help);
     Option& option = options_.back();
     const auto takeWord = option.set;
     const auto word = option.get;
@@ -141,9 +141,9 @@ class Options {
   /// the default now, and with what the command line says before its other options are read,
   /// wherever this one stands.
   template <typename E, std::size_t n>
-  void preset(std::string name, E& target, const std::array<Choice<E>, n>& choices,
-              std::function<void(E)> fill, std::string help) {
-    addChoice(std::move(name), Option::Kind::value, target, choices, std::move(help));
+  void preset(const std::string& name, E& target, const std::array<Choice<E>, n>& choices,
+              std::function<void(E)> fill, const std::string& help) {
+    addChoice(name, Option::Kind::value, target, choices, help);
     Option& option = options_.back();
     option.sets_others = true;
     fill(target);
@@ -155,9 +155,9 @@ class Options {
 
   void positional(std::string name, std::string& target, std::string help, bool required = true);
   template <typename E, std::size_t n>
-  void positional(std::string name, E& target, const std::array<Choice<E>, n>& choices,
-                  std::string help, bool required = true) {
-    addChoice(std::move(name), Option::Kind::positional, target, choices, std::move(help));
+  void positional(const std::string& name, E& target, const std::array<Choice<E>, n>& choices,
+                  const std::string& help, bool required = true) {
+    addChoice(name, Option::Kind::positional, target, choices, help);
     options_.back().required = required;
   }
   /// The one positional that takes several values.
@@ -190,26 +190,27 @@ class Options {
 
  private:
   Option& add(std::string name, Option::Kind kind, std::string value, std::string help);
-  void addWords(std::string name, Option::Kind kind, std::vector<Word> words,
-                std::function<void(std::size_t)> set, std::function<std::size_t()> get,
-                std::string help);
+  /// Makes `option` accept one of `words`. `set` and `get` deal with its index.
+  static void acceptWords(Option& option, std::vector<Word> words,
+                          std::function<void(std::size_t)> set, std::function<std::size_t()> get);
 
   template <typename E, std::size_t n>
-  void addChoice(std::string name, Option::Kind kind, E& target,
-                 const std::array<Choice<E>, n>& choices, std::string help) {
+  void addChoice(const std::string& name, Option::Kind kind, E& target,
+                 const std::array<Choice<E>, n>& choices, const std::string& help) {
+    Option& option = add(name, kind, "", help);
     std::vector<Word> words;
+    words.reserve(n);
     for (const Choice<E>& choice : choices)
       words.push_back({std::string(choice.name), std::string(choice.meaning)});
-    addWords(
-        std::move(name), kind, std::move(words),
+    acceptWords(
+        option, std::move(words),
         [&target, choices](std::size_t index) { target = choices[index].value; },
         [&target, choices] {
           const auto found =
               std::find_if(choices.begin(), choices.end(),
                            [&](const Choice<E>& choice) { return choice.value == target; });
           return static_cast<std::size_t>(found - choices.begin());
-        },
-        std::move(help));
+        });
   }
 
   std::vector<Option> options_;

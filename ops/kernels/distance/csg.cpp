@@ -12,6 +12,7 @@
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/surface_leaves.h"
+#include "ops/kernels/leaf/tie.h"
 #include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
@@ -25,7 +26,7 @@ namespace {
 
 using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>;
 
-/// The leaves of either, once each.
+/// Returns the leaves of either, each once.
 std::vector<Coord> leafOrigins(const FloatGrid& a, const FloatGrid& b, ZRange core) {
   std::vector<Coord> origins;
   for (const FloatGrid* grid : {&a, &b}) {
@@ -36,7 +37,7 @@ std::vector<Coord> leafOrigins(const FloatGrid& a, const FloatGrid& b, ZRange co
   return origins;
 }
 
-/// Calls `visit` with the leaf-sized pieces of the tiles inside of `surface`, cut to `core`.
+/// Calls `visit` with the leaf-sized pieces of the tiles inside `surface`, cut to `core`.
 template <typename Visit>
 void visitInsideBlocks(const FloatGrid& surface, ZRange core, const Visit& visit) {
   for (const CoordBBox& box : insideTiles(surface.tree(), core)) {
@@ -71,8 +72,8 @@ FloatGrid::Ptr combined(const FloatGrid& a, const FloatGrid& b, Csg operation, Z
       const LeafValues other = LeafValues::of(of_b, origins[n]);
       for (unsigned offset = 0; offset < 512; ++offset) {
         const float mine = values.distance[offset];
-        const float others =
-            operation == Csg::subtract ? -other.distance[offset] : other.distance[offset];
+        const float others = operation == Csg::subtract ? complemented(other.distance[offset])
+                                                        : other.distance[offset];
         const bool take = operation == Csg::unite ? others < mine : others > mine;
         if (!take) continue;
         const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
@@ -110,7 +111,7 @@ Int32Grid::Ptr unitedParts(const FloatGrid& a, const FloatGrid& b, const Int32Gr
   grid->setName(part_grid);
   grid->setTransform(a.transform().copy());
 
-  // Where either has a leaf of distances or of parts, voxels are decided one by one.
+  // Where either has a leaf of distances or of parts, voxels are assigned one by one.
   std::vector<Coord> origins = leafOrigins(a, b, core);
   for (const Int32Grid* parts : {a_parts, b_parts}) {
     if (!parts) continue;
@@ -126,7 +127,7 @@ Int32Grid::Ptr unitedParts(const FloatGrid& a, const FloatGrid& b, const Int32Gr
         : distance(surface.tree()), shift(first) {
       if (grid_of_parts) parts.emplace(grid_of_parts->tree());
     }
-    /// The part at a voxel, 0 where there is none, and its distance.
+    /// Returns the part at a voxel, 0 if there is none, and its distance.
     std::pair<int, float> at(const Coord& ijk) {
       float d = 0;
       const bool active = distance.probeValue(ijk, d);

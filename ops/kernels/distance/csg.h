@@ -8,30 +8,29 @@ namespace vdbdither {
 
 enum class Csg { unite, intersect, subtract };
 
-/// The distance to what two parts make together: min(a, b), max(a, b) or max(a, −b), on one
-/// lattice.
+/// Returns the distance to the combination of two parts on one lattice: min(a, b), max(a, b) or
+/// max(a, −b).
 ///
-/// The zero set is exact, and so is every sign. Outside of a union the distance is, too; inside it,
-/// as outside of an intersection or a difference, |d| is never too large, and too small only where
-/// the nearest surface of one part was taken away by the other. Where the two surfaces meet in an
-/// edge and enclose the angle φ < π (of empty space for a union, else of material), the true
-/// distance behind that edge is at most |d| / sin(φ/2): at a right angle √2 |d|. Of the voxels that
-/// dithering decides, those behind a re-entrant edge are thus decided as if they were a little
-/// nearer to it.
+/// The zero set and all signs are exact, and outside a union so is the distance. Inside a union,
+/// and outside an intersection or a difference, |d| is never too large, and too small only where
+/// the other part has removed the nearest surface. Where the two surfaces meet in an edge at the
+/// angle φ < π (of empty space for a union, of material otherwise), the true distance behind that
+/// edge is at most |d| / sin(φ/2): √2 |d| at a right angle. Dithering therefore treats voxels
+/// behind a re-entrant edge as if they were a little nearer to it.
 ///
-/// The background is the smaller of the two; a voxel is active where the one that gives the value
-/// is, nearer than that. Canonical.
+/// The background is the smaller of the two. A voxel is active if the one that gives its value is,
+/// and is nearer than the background. The tree is canonical.
 openvdb::FloatGrid::Ptr combined(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b,
                                  Csg operation, ZRange core);
 
-/// An empty grid as `combined` makes them.
+/// Returns an empty grid like those of `combined`.
 openvdb::FloatGrid::Ptr emptyCombined(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b);
 
-/// The parts of a united with those of b, whose numbers are raised by `shift`. A voxel inside of
-/// both belongs to a unless `b_first`; one inside of neither, but near, to the nearer, to a where
-/// they are equally near.
+/// Returns the parts of a united with those of b, whose numbers are raised by `shift`. A voxel
+/// inside both belongs to a unless `b_first`; a voxel near, but inside neither, belongs to the
+/// nearer, or to a if they are equally near.
 ///
-/// \param a_parts, b_parts  `part`, or null: all of a, or of b, is part 1
+/// The grids `a_parts` and `b_parts` are null if all of a, or of b, is part 1.
 openvdb::Int32Grid::Ptr unitedParts(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b,
                                     const openvdb::Int32Grid* a_parts,
                                     const openvdb::Int32Grid* b_parts, int shift, bool b_first,

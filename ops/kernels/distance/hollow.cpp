@@ -1,9 +1,11 @@
 #include "ops/kernels/distance/hollow.h"
 
+#include <cmath>
 #include <vector>
 
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/surface_leaves.h"
+#include "ops/kernels/leaf/tie.h"
 
 namespace vdbdither {
 
@@ -24,11 +26,22 @@ std::vector<Drain> drainsNear(std::span<const Drain> drains, const Lattice& latt
   return near;
 }
 
+/// The voxels of the leaf on the inner surface.
+LeafBits tiesUnder(const FloatLeaf& leaf, double thickness_mm, ZRange core) {
+  const LeafBits active = activeBits(leaf, rowWithin(leaf.origin().z(), core));
+  LeafBits ties{};
+  forEachBit(active, [&](unsigned offset) {
+    const double under = -(double{leaf.buffer().data()[offset]} + thickness_mm);
+    ties[offset / 64] |= std::uint64_t{std::abs(under) < moved_tie_mm} << (offset % 64);
+  });
+  return ties;
+}
+
 }  // namespace
 
 openvdb::FloatGrid::Ptr hollowed(const openvdb::FloatGrid& surface, const Lattice& lattice,
                                  double thickness_mm, std::span<const Drain> drains,
-                                 float background_mm, ZRange core) {
+                                 float background_mm, ZRange core, ZRange valid) {
   const std::vector<const FloatLeaf*> sources = leavesIn(surface.tree(), core);
   std::vector<Coord> origins;
   origins.reserve(sources.size());
@@ -36,13 +49,18 @@ openvdb::FloatGrid::Ptr hollowed(const openvdb::FloatGrid& surface, const Lattic
   std::vector<LeafValues> leaves(sources.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {
     const openvdb::tree::ValueAccessor<const openvdb::FloatTree, false> accessor(surface.tree());
+    LeafSurroundings around(surface.tree(), valid);
     for (std::size_t n = range.begin(); n != range.end(); ++n) {
+      const LeafBits ties = tiesUnder(*sources[n], thickness_mm, core);
+      if (ties != no_bits) around.visit(*sources[n], ties);
       LeafValues& values = leaves[n];
       values = LeafValues::of(accessor, origins[n]);
       const std::vector<Drain> near = drainsNear(drains, lattice, origins[n], background_mm);
       for (unsigned offset = 0; offset < 512; ++offset) {
         const double d = values.distance[offset];
-        const double under = -(d + thickness_mm);
+        double under = -(d + thickness_mm);
+        if ((ties[offset / 64] >> (offset % 64) & 1U) != 0)
+          under = trendOfTie(around.at(offset), lattice.pitch_mm) > 0 ? -tied_mm : tied_mm;
         double shell = std::max(d, under);
         // Where the distance is unknown only the side is: outside the part, or in the cavity.
         if (!(values.active[offset / 64] >> (offset % 64) & 1U)) shell = background_mm;

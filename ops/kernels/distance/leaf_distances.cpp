@@ -1,8 +1,8 @@
 // One source is compiled for the baseline and for AVX2. Without contraction both round every
-// operation alike.
+// operation in the same way.
 //
-// A region is convex: along z it is one interval. The intervals of four columns are found at once;
-// within them the distance takes no further test, but for the few voxels beside a triangle.
+// A region is convex, so that along z it is one interval. The intervals of four columns are found
+// at once; within them distances need no further test, except for the few voxels beside a triangle.
 
 #include "ops/kernels/distance/leaf_distances.h"
 
@@ -12,6 +12,7 @@
 #include <limits>
 
 #include "ops/kernels/distance/row_crossings.h"
+#include "ops/kernels/leaf/tie.h"
 
 namespace vdbdither {
 
@@ -20,7 +21,8 @@ namespace {
 constexpr int edge = leaf_layers;
 constexpr std::size_t leaves_per_page = 32;
 
-// The baseline takes two registers for one of these. They alias the arrays that they are laid over.
+// The baseline uses two registers for one of these. They may alias the arrays that they are read
+// from.
 using Doubles = double __attribute__((vector_size(32), may_alias));
 using Floats = float __attribute__((vector_size(16), may_alias));
 using Integers = std::int32_t __attribute__((vector_size(16), may_alias));
@@ -32,17 +34,17 @@ constexpr int lanes = 4;
 constexpr Doubles ramp{0, 1, 2, 3};
 constexpr Integers integer_ramp{0, 1, 2, 3};
 
-/// A bound solved for one axis: the axis' offset is at least or at most that of the plane. By
-/// `inwards` from there the triangle begins that the bound is a side of.
+/// A bound solved for one axis: the offset along the axis is at least or at most that of the plane.
+/// If the bound is a side of a triangle, the triangle begins `inwards` from the plane.
 struct Limit {
   double x, y, constant, inwards;
 };
 
-/// An end of an interval that holds nothing.
+/// The end of an empty interval.
 constexpr double nowhere = -1e9;
 
 /// Narrows [low, high], offsets along one axis, to where `best + slope · offset` can reach zero,
-/// and a little more than rounding may take from that.
+/// with a margin for rounding.
 [[gnu::always_inline]] inline void narrow(const LatticeForm& form, double best, double slope,
                                           double& low, double& high) {
   best += 1e-9 * (std::abs(form.x) + std::abs(form.y) + std::abs(form.z));
@@ -55,11 +57,12 @@ constexpr double nowhere = -1e9;
   }
 }
 
-/// What rounding may take from a form in mm, and more.
+/// More than the rounding error of a form in mm.
 constexpr double rounding_mm = 1e-9;
 
-/// The distances, mm, from the voxels of a column at k, k + 1, k + 2, k + 3 to a triangle, infinite
-/// where they are left out, in place of those to its plane, which they are over the triangle.
+/// Replaces the distances, mm, of the voxels of a column at k, k + 1, k + 2, k + 3 from a
+/// triangle's plane by those from the triangle, infinite for voxels that are left out. Over the
+/// triangle they are the same.
 [[gnu::always_inline]] inline void measureToTriangle(const LatticeRegion& region, int i, int j,
                                                      int k, Doubles& distance) {
   const Doubles infinite = Doubles{} + std::numeric_limits<double>::infinity();
@@ -90,7 +93,7 @@ template <int rank, bool track>
   const openvdb::Coord& base = region.base;
   const openvdb::Coord first = region.reach.min() - base;
   const openvdb::Coord last = region.reach.max() - base;
-  // Regions of a few planes are not worth a narrower look.
+  // Regions of a few planes are not narrowed further.
   constexpr int few = 8;
 
   const double k_first = first.z();
@@ -157,7 +160,7 @@ template <int rank, bool track>
       const Doubles columns = ramp + static_cast<double>(i);
       Doubles low = Doubles{} + k_first;
       Doubles high = Doubles{} + k_last;
-      // Of rank 1, where the column is over the triangle.
+      // For rank 1, where the column is over the triangle.
       Doubles inner_low = low;
       Doubles inner_high = high;
       for (std::size_t f = 0; f < floor_count; ++f) {
@@ -180,7 +183,7 @@ template <int rank, bool track>
       high = columns < static_cast<double>(i_end) ? high : Doubles{} + nowhere;
       low = low < k_last + 1 ? low : Doubles{} + (k_last + 1);
       high = high > nowhere ? high : Doubles{} + nowhere;
-      // Conversion cuts off fractions, of positive and of negative numbers.
+      // Conversion truncates positive and negative numbers.
       Doubles begin = __builtin_convertvector(__builtin_convertvector(low, Integers), Doubles);
       begin = begin < low ? begin + 1 : begin;
       Doubles end = __builtin_convertvector(__builtin_convertvector(high, Integers), Doubles);
@@ -265,7 +268,7 @@ template <int rank, bool track>
   const openvdb::Coord last = sheet.leaves.max() - sheet.base;
   const int low = sheet.leaves.min().z() - at.leaves().min().z();
   const int high = sheet.leaves.max().z() - at.leaves().min().z();
-  const int above = at.leaves().min().z() - sheet.base.z();  // of the box's lowest leaf
+  const int above = at.leaves().min().z() - sheet.base.z();  // of the lowest leaf of the box
   const Floats raised = Floats{} + value;
   for (int x = first.x(); x <= last.x(); ++x) {
     for (int y = first.y(); y <= last.y(); ++y) {
@@ -287,10 +290,12 @@ template <int rank, bool track>
 }
 
 [[gnu::always_inline]] inline LeafBits finishAll(const float* distances, const LeafBits& inside,
-                                                 const LeafBits& exists, float limit_mm,
-                                                 float background_mm, float* values) {
+                                                 const LeafBits& exists, float tie_mm,
+                                                 float limit_mm, float background_mm,
+                                                 float* values) {
   constexpr RowBits bit{1, 2, 4, 8, 16, 32, 64, 128};
   const Row background = Row{} + background_mm;
+  const Row tied = Row{} + tied_mm;
   LeafBits active;
   for (std::size_t plane = 0; plane < edge; ++plane) {
     std::uint64_t found = 0;
@@ -299,7 +304,8 @@ template <int rank, bool track>
       const Row& distance = *reinterpret_cast<const Row*>(distances + offset);
       const RowBits on =
           (distance < limit_mm) & ((static_cast<std::int32_t>(exists[plane] >> row) & bit) == bit);
-      Row value = on ? distance : background;
+      Row value = distance < tie_mm ? tied : distance;
+      value = on ? value : background;
       reinterpret_cast<RowBits&>(value) |=
           ((static_cast<std::int32_t>(inside[plane] >> row) & bit) == bit) &
           std::numeric_limits<std::int32_t>::min();
@@ -327,8 +333,8 @@ void raisePortable(const LatticeSheet& sheet, float value, const LeafDistances& 
   raiseAll(sheet, value, at, values);
 }
 LeafBits finishPortable(const float* distances, const LeafBits& inside, const LeafBits& exists,
-                        float limit_mm, float background_mm, float* values) {
-  return finishAll(distances, inside, exists, limit_mm, background_mm, values);
+                        float tie_mm, float limit_mm, float background_mm, float* values) {
+  return finishAll(distances, inside, exists, tie_mm, limit_mm, background_mm, values);
 }
 
 #if defined(__x86_64__)
@@ -341,9 +347,10 @@ __attribute__((target("avx2"))) void raiseAvx2(const LatticeSheet& sheet, float 
   raiseAll(sheet, value, at, values);
 }
 __attribute__((target("avx2"))) LeafBits finishAvx2(const float* distances, const LeafBits& inside,
-                                                    const LeafBits& exists, float limit_mm,
-                                                    float background_mm, float* values) {
-  return finishAll(distances, inside, exists, limit_mm, background_mm, values);
+                                                    const LeafBits& exists, float tie_mm,
+                                                    float limit_mm, float background_mm,
+                                                    float* values) {
+  return finishAll(distances, inside, exists, tie_mm, limit_mm, background_mm, values);
 }
 #endif
 

@@ -1,4 +1,5 @@
-// The layers are made in blocks of a few rows of leaves, each from the triangles that may reach it.
+// The layers are divided into blocks of a few rows of leaves, each made from the triangles that can
+// reach it.
 
 #include "ops/kernels/distance/mesh_distance.h"
 
@@ -28,7 +29,7 @@ namespace {
 
 constexpr int edge = leaf_layers;
 
-/// The items of every bin, in the order in which they were entered.
+/// The items of every bin, in the order of the entries.
 class Bins {
  public:
   struct Entry {
@@ -54,7 +55,20 @@ class Bins {
   std::vector<std::uint32_t> items_;
 };
 
-/// The greatest band, in diameters, of the normals whose components are at least `least`.
+/// The tie asked for, within what `mesh` and `lattice` allow.
+double tieWithin(const Mesh& mesh, const Lattice& lattice, double asked_mm) {
+  // Far above the rounding of products and sums in double precision.
+  constexpr double rounding = 0x1p-44;
+  double greatest_mm = 0;
+  for (const Vec3d& v : mesh.vertices)
+    for (int axis = 0; axis < 3; ++axis)
+      greatest_mm = std::max(greatest_mm, std::abs(v[axis]) + std::abs(lattice.origin_mm[axis]));
+  const Vec3d& pitch_mm = lattice.pitch_mm;
+  return std::min(std::max(asked_mm, rounding * greatest_mm),
+                  std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()}) / 4);
+}
+
+/// Returns the maximum band, in diameters, of the normals whose components are at least `least`.
 double bandAcross(const Vec3d& least, const Vec3d& pitch_mm) {
   double inverse_diameter = 1 / pitch_mm.length();
   double step_mm = 0;
@@ -70,9 +84,10 @@ double bandAcross(const Vec3d& least, const Vec3d& pitch_mm) {
 }  // namespace
 
 MeshDistance::MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band,
-                           DistanceExtras extras, const SwallowedWalls& walls)
+                           DistanceExtras extras, const SwallowedWalls& walls, double tie_mm)
     : lattice_(lattice),
       band_(band),
+      tie_mm_(tieWithin(mesh, lattice, tie_mm)),
       extras_(extras),
       features_(mesh, walls, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers,
                 lattice.pitch_mm.y() * leaf_layers * Block::leaf_rows,
@@ -91,15 +106,15 @@ double MeshDistance::memoryBytes() const {
          features_.memoryBytes();
 }
 
-/// How far along an axis a triangle can matter to a voxel: for the band's sake as `markBand` looks,
-/// a voxel more because boxes are rounded outwards.
+/// Returns how far along an axis a triangle can affect a voxel: as far as `Block::markBand` looks,
+/// and a voxel more because boxes are rounded outwards.
 double MeshDistance::reachMm(int axis) const {
-  return band_.mm > 0 ? band_.mm
+  return band_.mm > 0 ? std::max(band_.mm, tie_mm_)
                       : 2 * widest_mm_ + lattice_.diagonalMm() + 2 * lattice_.pitch_mm[axis];
 }
 
 void MeshDistance::append(const CoordBBox& voxels, DistanceGrids& grids) const {
-  // Blocks and nodes begin together.
+  // Blocks and nodes begin at the same places.
   const int first = NodeWriter<openvdb::FloatTree>::parentOf(voxels.min()).y() / edge;
   const auto blocks =
       static_cast<std::uint32_t>(((voxels.max().y() >> 3) - first) / Block::leaf_rows + 1);
@@ -137,7 +152,7 @@ void MeshDistance::append(const CoordBBox& voxels, DistanceGrids& grids) const {
       if (grids.closest) NodeWriter<openvdb::Int32Tree>::makeParent(grids.closest->tree(), origin);
     }
   }
-  // Blocks that share nodes lie in one of these groups.
+  // Blocks that share nodes are in the same group.
   constexpr int group_rows = NodeWriter<openvdb::FloatTree>::Parent::DIM / edge;
   const std::uint32_t group_blocks = group_rows / Block::leaf_rows;
   const std::uint32_t groups = (blocks + group_blocks - 1) / group_blocks;

@@ -1,6 +1,5 @@
-// Every feature of the mesh lowers the distances of a block's voxels where its region holds them;
-// the sign comes from a sweep along x, which needs nothing but the triangles that cross the layers
-// at hand.
+// Every feature of the mesh lowers the distances of a block's voxels in its region. The sign comes
+// from a sweep along x, which needs only the triangles that cross the block's layers.
 
 #include "ops/kernels/distance/mesh_distance_block.h"
 
@@ -11,7 +10,6 @@
 #include <limits>
 #include <utility>
 
-#include "ops/kernels/distance/row_crossings.h"
 #include "ops/kernels/distance/row_winding.h"
 
 namespace vdbdither {
@@ -24,7 +22,7 @@ namespace {
 
 constexpr int edge = leaf_layers;
 
-/// Closer than this the direction to the nearest point says nothing about the normal.
+/// Closer than this, the direction to the nearest point does not define the normal.
 constexpr double on_surface_mm = 1e-6;
 
 Vec3d lowest(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
@@ -43,7 +41,7 @@ LatticeForm onLattice(const LinearForm& form, const Vec3d& pitch_mm, const Vec3d
           form.gradient.z() * pitch_mm.z(), form.at(base_mm)};
 }
 
-/// band_mm − sign · form, which is below zero beyond the band.
+/// Returns band_mm − sign · form, which is negative beyond the band.
 LatticeForm within(const LatticeForm& form, double band_mm, double sign) {
   return {-sign * form.x, -sign * form.y, -sign * form.z, band_mm - sign * form.constant};
 }
@@ -63,7 +61,7 @@ MeshDistance::Block::Made MeshDistance::Block::make(std::span<const std::uint32_
   return sweep();
 }
 
-/// The voxels within a box; empty where there are none.
+/// Returns the block's voxels within a box; it may be empty.
 CoordBBox MeshDistance::Block::reachOf(const Vec3d& low_mm, const Vec3d& high_mm) const {
   CoordBBox reach;
   for (int axis = 2; axis >= 0; --axis) {
@@ -80,8 +78,9 @@ CoordBBox MeshDistance::Block::reachOf(const Vec3d& low_mm, const Vec3d& high_mm
   return reach;
 }
 
-/// A voxel is decided by the normal at its closest surface voxel. That lies at most a band and a
-/// voxel diagonal away, and the surface at most another band from there.
+/// Raises the band of the leaves that a triangle's band can matter to. Dithering decides a voxel by
+/// the normal at its closest surface voxel, which is at most a band and a voxel diagonal away, and
+/// the surface at most another band from there.
 void MeshDistance::Block::markBand(std::uint32_t triangle) {
   const float band_mm = field_.triangle_band_mm_[triangle];
   const double around_mm = 2 * band_mm + pitch_mm_.length();
@@ -98,8 +97,8 @@ void MeshDistance::Block::markBand(std::uint32_t triangle) {
     sheet.leaves.min()[axis] = std::max(sheet.base[axis], leaves_.min()[axis]);
     sheet.leaves.max()[axis] = std::min(top, leaves_.max()[axis]);
   }
-  const Vec3d middle_mm =
-      ((sheet.base << 3).asVec3d() + Vec3d(0.5 * (edge - 1))) * pitch_mm_;  // of the base's voxels
+  // Of the voxels of the base leaf.
+  const Vec3d middle_mm = ((sheet.base << 3).asVec3d() + Vec3d(0.5 * (edge - 1))) * pitch_mm_;
   const Vec3d step = all_.normal(triangle) * pitch_mm_;
   sheet.form = {step.x() * edge, step.y() * edge, step.z() * edge,
                 all_.normal(triangle).dot(middle_mm - a)};
@@ -108,18 +107,18 @@ void MeshDistance::Block::markBand(std::uint32_t triangle) {
   kernels_.raise(sheet, band_mm, work_.distances, work_.bands_mm.data());
 }
 
-/// Counts the rows that a triangle crosses and lowers distances to its features.
+/// Notes the rows that a triangle crosses, and lowers the distances to its features.
 void MeshDistance::Block::enter(std::uint32_t triangle) {
   const Vec3d& a = all_.corner(triangle, 0);
   const Vec3d& b = all_.corner(triangle, 1);
   const Vec3d& c = all_.corner(triangle, 2);
   const Vec3d low = lowest(a, b, c);
   const Vec3d high = highest(a, b, c);
-  // Rows begin before the block: what lies there counts.
+  // Rows begin before the block, so that triangles there count too.
   for (const int axis : {2, 1})
     if (low[axis] > high_mm_[axis] || high[axis] < low_mm_[axis]) return;
   if (all_.bounds(triangle)) {
-    visitRowCrossings({a, b, c}, pitch_mm_, voxels_, [&](const Coord& ijk, int delta) {
+    crossings_.visit({a, b, c}, voxels_, [&](const Coord& ijk, int delta) {
       work_.distances.note(work_.distances.slot(ijk >> 3), RowWinding::pack(ijk, delta));
     });
   }
@@ -128,7 +127,7 @@ void MeshDistance::Block::enter(std::uint32_t triangle) {
   if (reach.empty()) return;
   double band_mm = greatest_mm_;
   if (!work_.bands_mm.empty()) {
-    // The widest of the leaves that it may reach.
+    // The widest band of the leaves that it can reach.
     float widest_mm = 0;
     const CoordBBox around(reach.min() >> 3, reach.max() >> 3);
     for (int x = around.min().x(); x <= around.max().x(); ++x)
@@ -150,7 +149,7 @@ void MeshDistance::Block::lower(MeshFeatures::Id id, double band_mm) {
   region.reach = reachOf(feature.min - feature.below * band_mm - feature.spread_mm,
                          feature.max + feature.above * band_mm + feature.spread_mm);
   if (region.reach.empty()) return;
-  // The base must not depend on the block or the band, for rounding does on it.
+  // The base must not depend on the block or the band, because rounding depends on it.
   region.base = roundedDownAll(feature.min * per_mm_) & ~(edge - 1);
   const Vec3d base_mm = region.base.asVec3d() * pitch_mm_;
   region.rank = feature.rank;
@@ -188,11 +187,11 @@ LeafBits MeshDistance::Block::existing(const Coord& origin) const {
   return bits;
 }
 
-/// Along x, all rows of leaves at once.
+/// Makes the leaves and tiles, sweeping along x through all rows of leaves at once.
 MeshDistance::Block::Made MeshDistance::Block::sweep() const {
   Made made;
   std::array<RowWinding, leaf_rows * LeafDistances::depth> rows;
-  std::uint64_t filled = 0;   // rows with some of the inside in the last plane
+  std::uint64_t filled = 0;   // rows with inside voxels in the last plane
   std::uint64_t running = 0;  // rows whose last leaf was wholly inside
   std::array<LeafSpan, leaf_rows * LeafDistances::depth> spans;
   const auto end_spans = [&](std::uint64_t ended) {
@@ -248,10 +247,10 @@ void MeshDistance::Block::makeLeaf(const Coord& leaf_index, const LeafBits& insi
     any_outside |= within[plane] != ~0ULL;
   }
   Leaf leaf;
-  leaf.surface.reset(newLeaf<openvdb::FloatTree>(origin, 0));
-  const LeafBits active =
-      kernels_.finish(distances ? distances : far.data(), within, exists, band_mm,
-                      static_cast<float>(greatest_mm_), leaf.surface->buffer().data());
+  leaf.surface.reset(newLeaf<openvdb::FloatTree>(origin));
+  const LeafBits active = kernels_.finish(
+      distances ? distances : far.data(), within, exists, static_cast<float>(field_.tie_mm_),
+      band_mm, static_cast<float>(greatest_mm_), leaf.surface->buffer().data());
   const bool any_active =
       std::any_of(active.begin(), active.end(), [](std::uint64_t bits) { return bits != 0; });
   if (!any_active && !any_inside) return;
@@ -275,9 +274,8 @@ void MeshDistance::Block::addExtras(Leaf& leaf, const std::uint32_t* names) cons
   };
   const Coord origin = leaf.surface->origin();
   const openvdb::Vec3s no_normal(0, 0, 0);
-  if (field_.extras_.normals)
-    give(leaf.normals, newLeaf<openvdb::Vec3STree>(origin, no_normal), no_normal);
-  if (field_.extras_.closest) give(leaf.closest, newLeaf<openvdb::Int32Tree>(origin, -1), -1);
+  if (field_.extras_.normals) give(leaf.normals, newLeaf<openvdb::Vec3STree>(origin), no_normal);
+  if (field_.extras_.closest) give(leaf.closest, newLeaf<openvdb::Int32Tree>(origin), -1);
 
   for (auto it = leaf.surface->cbeginValueOn(); it; ++it) {
     const openvdb::Index v = it.pos();
@@ -287,8 +285,9 @@ void MeshDistance::Block::addExtras(Leaf& leaf, const std::uint32_t* names) cons
       leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(all_.original(triangle));
     if (!leaf.normals) continue;
     const double distance = away.length();
-    const Vec3d normal =
-        distance < on_surface_mm ? all_.normal(triangle) : away / (*it < 0 ? -distance : distance);
+    const Vec3d normal = distance < std::max(on_surface_mm, field_.tie_mm_)
+                             ? all_.normal(triangle)
+                             : away / (*it < 0 ? -distance : distance);
     leaf.normals->buffer().data()[v] = openvdb::Vec3s(normal);
   }
 }

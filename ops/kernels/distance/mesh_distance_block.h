@@ -9,32 +9,33 @@
 
 #include "ops/kernels/distance/leaf_distances.h"
 #include "ops/kernels/distance/mesh_distance.h"
+#include "ops/kernels/distance/row_crossings.h"
 #include "ops/kernels/leaf/node_writer.h"
 
 namespace vdbdither {
 
-/// Rows of leaves that one thread makes.
+/// A few rows of leaves, made by one thread.
 class MeshDistance::Block {
  public:
   /// Rows of leaves of a block: enough that few triangles meet two blocks, few enough that the
   /// leaves near a part's surface stay in the cache.
   static constexpr int leaf_rows = LeafDistances::max_rows;
 
-  /// What a thread keeps between blocks.
+  /// Memory that a thread reuses between blocks.
   struct Workspace {
     LeafDistances distances;
-    std::vector<float> bands_mm;  ///< of every leaf; empty where it is the same for all
+    std::vector<float> bands_mm;  ///< of every leaf; empty if it is the same for all
   };
   struct Leaf {
     std::unique_ptr<openvdb::FloatTree::LeafNodeType> surface;
     std::unique_ptr<openvdb::Vec3STree::LeafNodeType> normals;
     std::unique_ptr<openvdb::Int32Tree::LeafNodeType> closest;
   };
-  /// What it comes to.
+  /// The leaves and tiles of a block.
   struct Made {
     std::vector<Leaf> leaves;
-    std::vector<LeafSpan> interior;       ///< leaves that are wholly inside
-    std::vector<openvdb::Coord> parents;  ///< origins of the few nodes above all of them
+    std::vector<LeafSpan> interior;       ///< leaves wholly inside
+    std::vector<openvdb::Coord> parents;  ///< origins of the few nodes above them
 
     void add(Leaf leaf) {
       noteParent(leaf.surface->origin());
@@ -56,7 +57,7 @@ class MeshDistance::Block {
     }
   };
 
-  /// `voxels`: those that exist. `triangles`: those that may reach them, in the mesh's order.
+  /// `voxels` are those to make, of the lattice's box.
   Block(const MeshDistance& field, const openvdb::CoordBBox& voxels, Workspace& workspace)
       : field_(field),
         all_(field.features_),
@@ -65,11 +66,13 @@ class MeshDistance::Block {
         voxels_(voxels),
         leaves_(voxels.min() >> 3, voxels.max() >> 3),
         greatest_mm_(field.backgroundMm()),
-        low_mm_(voxels.min().asVec3d() * pitch_mm_ - greatest_mm_),
-        high_mm_(voxels.max().asVec3d() * pitch_mm_ + greatest_mm_),
+        low_mm_(voxels.min().asVec3d() * pitch_mm_ - std::max(greatest_mm_, field.tie_mm_)),
+        high_mm_(voxels.max().asVec3d() * pitch_mm_ + std::max(greatest_mm_, field.tie_mm_)),
+        crossings_(pitch_mm_, field.tie_mm_ / RowCrossings::tie_roundings),
         kernels_(leafKernels()),
         work_(workspace) {}
 
+  /// `triangles` are those that can reach the voxels, in the order of the mesh.
   Made make(std::span<const std::uint32_t> triangles);
 
  private:
@@ -90,7 +93,8 @@ class MeshDistance::Block {
   openvdb::CoordBBox voxels_;
   openvdb::CoordBBox leaves_;
   double greatest_mm_;
-  openvdb::Vec3d low_mm_, high_mm_;  ///< what may matter to the voxels
+  openvdb::Vec3d low_mm_, high_mm_;  ///< the range that can affect the voxels
+  RowCrossings crossings_;
   const LeafKernels& kernels_;
   Workspace& work_;
 };

@@ -16,6 +16,7 @@
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/surface_leaves.h"
+#include "ops/kernels/leaf/tie.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -99,7 +100,7 @@ double SurfaceOffset::greatestMm() const {
 }
 
 SurfaceOffset::Reach SurfaceOffset::reach() const {
-  if (!varies()) return {};
+  if (!varies()) return {1, 0};  // for ties
   if (at == At::foot) {
     const int steps = static_cast<int>(std::ceil(held_mm / lattice.pitch_mm.z() + 0.5));
     return {1, from_grid ? steps : 0};
@@ -122,15 +123,24 @@ FloatGrid::Ptr SurfaceOffset::run(const FloatGrid& surface, const FloatGrid* hei
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {
       const Accessor accessor(surface.tree());
       auto reader = make_reader();
+      LeafSurroundings around(surface.tree(), valid);
       for (std::size_t n = range.begin(); n != range.end(); ++n) {
         leaves[n] = LeafValues::of(accessor, origins[n]);
         const std::uint8_t within = rowWithin(origins[n].z(), core);
         LeafBits active = leaves[n].active;
         for (std::uint64_t& word : active) word &= everyRow(within);
         reader.visit(*sources[n]);
+        LeafBits ties{};
         forEachBit(active, [&](unsigned offset) {
           float& d = leaves[n].distance[offset];
           d = static_cast<float>(double{d} - reader(offset, d));
+          ties[offset / 64] |= std::uint64_t{std::abs(d) < moved_tie_mm} << (offset % 64);
+        });
+        if (varies() || ties == no_bits) continue;
+        around.visit(*sources[n], ties);
+        forEachBit(ties, [&](unsigned offset) {
+          const int trend = trendOfTie(around.at(offset), lattice.pitch_mm);
+          leaves[n].distance[offset] = trend < 0 ? -tied_mm : tied_mm;
         });
       }
     });

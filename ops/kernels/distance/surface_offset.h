@@ -15,6 +15,8 @@ namespace vdbdither {
 ///
 /// Where h is constant, d′ is a distance: exact outside a growing part, and too small behind its
 /// re-entrant edges, as that of a union is. Where h varies, |∇d′| is √(1 + |∇h|²).
+/// A centre on a surface moved by a constant is inside if d′ falls towards the point shifted by
+/// (ε, ε³, ε²).
 struct SurfaceOffset {
   enum class At {
     closest,  ///< the closest surface voxel v̄, which a column of voxels shares

@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/leaf/solid.h"
+#include "ops/kernels/leaf/tie.h"
 
 namespace vdbdither {
 
@@ -23,6 +24,14 @@ Band widened(const Band& band, const Vec3d& pitch_mm, double slack_mm) {
                      : Band{band.diameters + slack_mm / minimum_mm, 0};
 }
 
+/// What single precision leaves open of positions in such a box.
+double tieOf(const ZeroSet::Bounds& bounds) {
+  double greatest_mm = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    greatest_mm = std::max({greatest_mm, std::abs(bounds.min[axis]), std::abs(bounds.max[axis])});
+  return 0x1p-20 * greatest_mm;
+}
+
 int chunkOf(int layer, int layers) { return (layer - (layer < 0 ? layers - 1 : 0)) / layers; }
 
 }  // namespace
@@ -31,7 +40,8 @@ ZeroSetDistance::ZeroSetDistance(std::shared_ptr<const ZeroSet> surface, const L
                                  const Band& band, double slack_mm)
     : surface_(std::move(surface)),
       lattice_(lattice),
-      wide_(widened(band, lattice.pitch_mm, slack_mm)) {}
+      wide_(widened(band, lattice.pitch_mm, slack_mm)),
+      tie_mm_(tieOf(surface_->bounds())) {}
 
 std::shared_ptr<const MeshDistance> ZeroSetDistance::chunk(int index) const {
   const std::lock_guard lock(mutex_);
@@ -41,7 +51,8 @@ std::shared_ptr<const MeshDistance> ZeroSetDistance::chunk(int index) const {
   const double low_mm = index * chunk_layers * lattice_.pitch_mm.z() + lattice_.origin_mm.z();
   const Mesh mesh = surface_->triangles(low_mm - around_mm,
                                         low_mm + chunk_layers * lattice_.pitch_mm.z() + around_mm);
-  last_ = std::make_shared<MeshDistance>(mesh, lattice_, wide_, DistanceExtras{true});
+  last_ = std::make_shared<MeshDistance>(mesh, lattice_, wide_, DistanceExtras{true},
+                                         SwallowedWalls{}, tie_mm_);
   last_index_ = index;
   return last_;
 }
@@ -84,7 +95,9 @@ void ZeroSetDistance::correct(FloatGrid& surface, const openvdb::Vec3SGrid& norm
       for (auto voxel = leaf.beginValueOn(); voxel; ++voxel) {
         const Vec3d position = lattice_.position(voxel.getCoord());
         const Vec3d foot = position - Vec3d(directions->getValue(voxel.pos())) * double{*voxel};
-        const auto corrected = static_cast<float>(feet.distanceMm(position, foot, double{*voxel}));
+        auto corrected = static_cast<float>(feet.distanceMm(position, foot, double{*voxel}));
+        if (std::abs(corrected) < tie_mm_)
+          corrected = tieIsInside(Vec3d(directions->getValue(voxel.pos()))) ? -tied_mm : tied_mm;
         if (std::abs(corrected) < background) {
           voxel.setValue(corrected);
         } else {

@@ -37,6 +37,7 @@ class ZeroSetDistance {
   std::shared_ptr<const ZeroSet> surface_;
   Lattice lattice_;
   Band wide_;
+  double tie_mm_;  ///< centres nearer than this to the surface lie on it
   mutable std::mutex mutex_;
   mutable int last_index_ = 0;
   mutable std::shared_ptr<const MeshDistance> last_;

@@ -9,11 +9,11 @@
 
 namespace vdbdither {
 
-/// An inactive leaf whose voxels hold `value`, with its buffer allocated.
+/// Returns an inactive leaf with its buffer allocated. The caller must set every voxel: they are
+/// not initialized.
 template <class Tree>
-typename Tree::LeafNodeType* newLeaf(const openvdb::Coord& origin,
-                                     const typename Tree::ValueType& value) {
-  auto* leaf = new typename Tree::LeafNodeType(openvdb::PartialCreate(), origin, value, false);
+typename Tree::LeafNodeType* newLeaf(const openvdb::Coord& origin) {
+  auto* leaf = new typename Tree::LeafNodeType(openvdb::PartialCreate(), origin);
   leaf->allocate();
   return leaf;
 }

@@ -45,7 +45,9 @@ Mesh joined(std::vector<Mesh> meshes) {
   return all;
 }
 
-void place(std::span<Mesh> meshes, const MeshPlacement& placement) {
+Vec3d bedCornerMm(const Lattice& lattice) { return lattice.origin_mm - 0.5 * lattice.pitch_mm; }
+
+double place(std::span<Mesh> meshes, const MeshPlacement& placement) {
   double factor = placement.factor;
   for (Mesh& mesh : meshes) rotate(mesh, placement.rotate_degrees);
   if (placement.fit_mm > 0) {
@@ -57,10 +59,12 @@ void place(std::span<Mesh> meshes, const MeshPlacement& placement) {
   }
   for (Mesh& mesh : meshes)
     for (Vec3d& vertex : mesh.vertices) vertex *= factor;
-  if (!placement.on_bed) return;
-  const Vec3d corner = boundsOf(meshes).min;
-  for (Mesh& mesh : meshes)
-    for (Vec3d& vertex : mesh.vertices) vertex -= corner;
+  if (placement.corner_mm) {
+    const Vec3d move_mm = *placement.corner_mm - boundsOf(meshes).min;
+    for (Mesh& mesh : meshes)
+      for (Vec3d& vertex : mesh.vertices) vertex += move_mm;
+  }
+  return factor;
 }
 
 }  // namespace vdbdither

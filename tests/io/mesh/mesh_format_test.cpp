@@ -15,6 +15,10 @@
 namespace vdbdither::test {
 namespace {
 
+std::vector<openvdb::Vec3s> floatsOf(const Mesh& mesh) {
+  return {mesh.vertices.begin(), mesh.vertices.end()};
+}
+
 /// What every registered format promises.
 class MeshFormats : public testing::TestWithParam<const MeshFormat*> {
  protected:
@@ -34,7 +38,10 @@ class MeshFormats : public testing::TestWithParam<const MeshFormat*> {
 
 TEST_P(MeshFormats, ReadsBackWhatItWrites) {
   const Mesh mesh = floatPart();
-  expectSame(parseQuietly(written(mesh)), mesh);
+  const Mesh read = parseQuietly(written(mesh));
+  // A text holds the shortest decimal that reads as the same float.
+  EXPECT_EQ(floatsOf(read), floatsOf(mesh));
+  EXPECT_EQ(read.triangles, mesh.triangles);
   EXPECT_EQ(filesUnder(scratch_.path()).size(), 1U) << "nothing else is left";
 }
 

@@ -59,6 +59,10 @@ const std::string example_text = R"({
   1
  ],
  "first_layer": 4,
+ "cropped": {
+  "below": 0,
+  "above": 0
+ },
  "box": {
   "min": [
    -1,

@@ -54,7 +54,7 @@ class SliceFormats : public testing::TestWithParam<const SliceFormat*> {
     const Manifest stack = planned();
     const std::unique_ptr<SliceEncoder> encoder = GetParam()->encoder();
     encoder->plan(stack, {});
-    StackWriter writer(target, stack, {"s", 3, 7}, *encoder);
+    StackWriter writer(target, stack, {"s", 3, 7}, *encoder, false);
     for (int z = layers.begin; z < layers.end; z += 5) {
       const ZRange piece = intersection({z, z + 5}, layers);
       std::vector<SpanImage> images;
@@ -95,6 +95,54 @@ TEST_P(SliceFormats, ItsManifestNamesEverySliceOnce) {
     EXPECT_TRUE(there.contains(slice.file)) << slice.file;
   }
   EXPECT_THAT(stack.slices.front().file, HasSubstr("s007."));
+}
+
+/// Writes blank layers but for those of `printed`, out of the layers `given`.
+Manifest writeCropped(const std::filesystem::path& target, const Manifest& stack,
+                      const SliceEncoder& encoder, ZRange printed, ZRange given, bool keep_blank) {
+  StackWriter writer(target, stack, {"s", 3, 7}, encoder, keep_blank);
+  for (int z = given.begin; z < given.end; z += 5) {
+    const ZRange piece = intersection({z, z + 5}, given);
+    std::vector<SpanImage> images;
+    for (int layer = piece.begin; layer < piece.end; ++layer) {
+      images.push_back(test::spanImage(19, 11, [&](int x, int) {
+        return std::uint32_t{printed.contains(layer) && layer % 2 == 0 && x == 3};
+      }));
+    }
+    writer.add(piece, images, {});
+  }
+  return writer.finish();
+}
+
+TEST_P(SliceFormats, LeavesOutTheBlankLayersBelowAndAboveThePart) {
+  const Manifest stack = planned();
+  const std::unique_ptr<SliceEncoder> encoder = GetParam()->encoder();
+  encoder->plan(stack, {});
+  const bool keeps = !encoder->reads().empty();
+  // Blank ones within the part stay.
+  const ZRange printed{0, 7};
+  const Manifest made = writeCropped(scratch_ / "out", stack, *encoder, printed, layers, false);
+  EXPECT_EQ(made.layers, keeps ? layers : printed);
+  EXPECT_EQ(made.knownLayers(), layers);
+  EXPECT_THAT(made.slices.front().file, HasSubstr("s007."));
+  const StackReader reader(scratch_ / "out", [](const std::string& text) { FAIL() << text; });
+  EXPECT_EQ(reader.manifest().cropped_below, keeps ? 0 : 3);
+  EXPECT_EQ(reader.manifest().cropped_above, keeps ? 0 : 7);
+  for (int z = layers.begin; z < layers.end; ++z)
+    EXPECT_EQ(isBlank(reader.layer(z)), !(printed.contains(z) && z % 2 == 0)) << z;
+}
+
+TEST_P(SliceFormats, KeepsBlankLayersOnDemandOfPiecesAndWhereNothingIsPrinted) {
+  const Manifest stack = planned();
+  const std::unique_ptr<SliceEncoder> encoder = GetParam()->encoder();
+  encoder->plan(stack, {});
+  const auto kept = [&](const char* name, ZRange printed, ZRange given, bool keep_blank) {
+    return writeCropped(scratch_ / name, stack, *encoder, printed, given, keep_blank).layers;
+  };
+  EXPECT_EQ(kept("all", {0, 7}, layers, true), layers);
+  EXPECT_EQ(kept("nothing", {0, 0}, layers, false), layers);
+  const ZRange piece{-1, 10};
+  EXPECT_EQ(kept("piece", {2, 5}, piece, false), piece);
 }
 
 TEST_P(SliceFormats, ASpoiltFileIsDecodedOrRefused) {

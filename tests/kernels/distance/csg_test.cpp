@@ -137,5 +137,17 @@ TEST_F(CsgTest, NothingIsNeutral) {
   EXPECT_TRUE(combined(*a, *nothing, Csg::intersect, lattice.layers())->empty());
 }
 
+TEST_F(CsgTest, WhatLiesOnTheSurfaceOfTheSecondIsNotTakenAway) {
+  const auto slab =
+      test::sampled([](const Vec3d& p) { return std::abs(p.z()) - 0.2; }, lattice, 0.15);
+  const auto upper = test::sampled([](const Vec3d& p) { return -p.z(); }, lattice, 0.15);
+  const auto left = combined(*slab, *upper, Csg::subtract, lattice.layers());
+  for (int i = -3; i <= 3; ++i) {
+    EXPECT_GE(upper->tree().getValue(Coord(i, 0, 0)), 0) << "outside of the second";
+    EXPECT_LT(left->tree().getValue(Coord(i, 0, 0)), 0) << "so it stays";
+    EXPECT_GE(left->tree().getValue(Coord(i, 0, 1)), 0);
+  }
+}
+
 }  // namespace
 }  // namespace vdbdither

@@ -55,7 +55,7 @@ TEST(Hollow, BothSurfacesOfAHollowBallHaveTheirTrueDistances) {
   const double thickness = 0.3;
   const auto ball = test::sphere({0, 0, 0}, radius);
   const auto shell = hollowed(*test::sampled(ball, lattice, 0.45), lattice, thickness, {}, 0.12F,
-                              lattice.layers());
+                              lattice.layers(), lattice.layers());
   test::expectHolds(
       *shell, lattice, [&](const Vec3d& at) { return std::max(ball(at), -thickness - ball(at)); },
       0.12);
@@ -69,8 +69,8 @@ TEST(Hollow, ADrainOpensTheShellAndHasATrueDistanceInIt) {
   const auto ball = test::sphere({0, 0, 0}, 0.9);
   const Drain drain{{0, 0, 0.9}, {0, 0, 1}, 0.2, 0.5};
   const std::vector<Drain> drains{drain};
-  const auto shell =
-      hollowed(*test::sampled(ball, lattice, 0.45), lattice, 0.3, drains, 0.12F, lattice.layers());
+  const auto shell = hollowed(*test::sampled(ball, lattice, 0.45), lattice, 0.3, drains, 0.12F,
+                              lattice.layers(), lattice.layers());
   // From the cavity straight up there is no wall any more, and downwards there is.
   for (int z = 0; z < 45; ++z) {
     ASSERT_GT(shell->tree().getValue(Coord(0, 0, z)), 0) << z;
@@ -92,9 +92,21 @@ TEST(Hollow, ADrainOpensTheShellAndHasATrueDistanceInIt) {
 TEST(Hollow, WhatIsThinnerThanTwoShellsStaysSolid) {
   const auto ball = test::sphere({0, 0, 0}, 0.25);
   const auto before = test::sampled(ball, lattice, 0.45);
-  const auto shell = hollowed(*before, lattice, 0.3, {}, 0.12F, lattice.layers());
+  const auto shell = hollowed(*before, lattice, 0.3, {}, 0.12F, lattice.layers(), lattice.layers());
   for (const Coord& ijk : lattice.box)
     ASSERT_EQ(shell->tree().getValue(ijk) < 0, before->tree().getValue(ijk) < 0) << ijk;
+}
+
+TEST(Hollow, ACavityThroughCentresBeginsWithItsLowerFacesAndEndsBeforeItsUpperOnes) {
+  const double thickness_mm = 2.5 * pitch_mm.z();
+  const Lattice cubes{Vec3d(pitch_mm.z()), Vec3d(0.0), openvdb::CoordBBox(Coord(-9), Coord(8))};
+  const auto box = test::box({0, 0, 0}, Vec3d(4.5 * pitch_mm.z()), {0, 0, 0});
+  const auto shell = hollowed(*test::sampled(box, cubes, 0.08), cubes, thickness_mm, {}, 0.02F,
+                              cubes.layers(), cubes.layers());
+  const openvdb::CoordBBox outer(Coord(-4), Coord(4));
+  const openvdb::CoordBBox cavity(Coord(-2), Coord(1));
+  for (const Coord& ijk : cubes.box)
+    ASSERT_EQ(shell->tree().getValue(ijk) < 0, outer.isInside(ijk) && !cavity.isInside(ijk)) << ijk;
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "ops/kernels/leaf/tie.h"
 #include "ops/kernels/mesh/closest_point.h"
 
 namespace vdbdither {
@@ -197,15 +198,16 @@ TEST(LeafDistances, EveryInstructionSetGivesTheSameBits) {
       for (std::uint64_t& bits : exists) bits = std::uint64_t{random()} << 32 | random();
       alignas(64) std::array<float, LeafDistances::voxels> a, b;
       const LeafBits active =
-          leafKernels().finish(fast.distances(slot), inside, exists, 0.03F, 0.3F, a.data());
+          leafKernels().finish(fast.distances(slot), inside, exists, 0.01F, 0.03F, 0.3F, a.data());
       ASSERT_EQ(active, portableLeafKernels().finish(portable.distances(slot), inside, exists,
-                                                     0.03F, 0.3F, b.data()));
+                                                     0.01F, 0.03F, 0.3F, b.data()));
       ASSERT_EQ(std::memcmp(a.data(), b.data(), sizeof a), 0);
       for (std::size_t v = 0; v < a.size(); ++v) {
         const auto bit = [&](const LeafBits& bits) { return (bits[v / 64] >> v % 64 & 1) != 0; };
         const float distance = fast.distances(slot)[v];
         ASSERT_EQ(bit(active), distance < 0.03F && bit(exists));
-        ASSERT_EQ(a[v], (bit(inside) ? -1.0F : 1.0F) * (bit(active) ? distance : 0.3F));
+        const float size = !bit(active) ? 0.3F : distance < 0.01F ? tied_mm : distance;
+        ASSERT_EQ(a[v], (bit(inside) ? -1.0F : 1.0F) * size);
       }
     }
   }

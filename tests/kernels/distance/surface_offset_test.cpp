@@ -146,5 +146,20 @@ TEST(SurfaceOffset, RefusesHeightsBeyondTheLimit) {
   }
 }
 
+TEST(SurfaceOffset, FacesMovedOntoCentresBelongToHalfOpenIntervals) {
+  const double edge_mm = pitch_mm.z();
+  SurfaceOffset offset;
+  offset.lattice = {Vec3d(edge_mm), Vec3d(0.0), openvdb::CoordBBox(Coord(-10), Coord(9))};
+  offset.constant_mm = -1.5 * edge_mm;
+  offset.held_mm = 4 * edge_mm;
+  const auto box = test::box({0, 0, 0}, Vec3d(4.5 * edge_mm), {0, 0, 0});
+  const auto layers = offset.lattice.layers();
+  const auto moved =
+      offset.run(*test::sampled(box, offset.lattice, offset.held_mm), nullptr, layers, layers);
+  const openvdb::CoordBBox inside(Coord(-3), Coord(2));
+  for (const Coord& ijk : offset.lattice.box)
+    ASSERT_EQ(moved->tree().getValue(ijk) < 0, inside.isInside(ijk)) << ijk;
+}
+
 }  // namespace
 }  // namespace vdbdither

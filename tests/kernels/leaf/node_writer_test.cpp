@@ -17,7 +17,8 @@ TEST(NodeWriter, AddsLeavesAndSpansOfTilesAcrossNodes) {
   FloatTree tree(1.0F);
   for (const Coord& origin : {Coord(-8, 0, 0), Coord(0, 0, 0)}) Writer::makeParent(tree, origin);
   Writer writer(tree);
-  std::unique_ptr<FloatTree::LeafNodeType> leaf(newLeaf<FloatTree>({8, 0, 0}, 0.25F));
+  std::unique_ptr<FloatTree::LeafNodeType> leaf(newLeaf<FloatTree>({8, 0, 0}));
+  leaf->fill(0.25F, false);
   leaf->setValueOn(Coord(9, 1, 2), 0.5F);
   writer.set(std::move(leaf));
   writer.set({{-16, 0, 0}, 3}, -1.0F);
