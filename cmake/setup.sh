@@ -10,14 +10,14 @@ program_packages=(build-essential cmake ninja-build libopenvdb-dev libboost-iost
 test_packages=(libgtest-dev libgmock-dev libbenchmark-dev libspng-dev libopenvdb-tools
   python3-openvdb python3-numpy python3-pil python3-skimage python3-matplotlib)
 sanitize_packages=(clang-14 libclang-rt-14-dev llvm-14)
-lint_packages=(clang-14 clang-format-14 clang-tidy-14)
+lint_packages=(clang-14 clang-format-14 clang-tidy-14 libclang-14-dev llvm-14-dev)
 
-# Says what takes long to whom is watching.
+# Names a step that can take minutes.
 say() {
-  if [ -t 2 ]; then echo "$*" >&2; fi
+  echo "$*" >&2
 }
 
-# Runs a command without a word; shows what it said if it fails.
+# Runs a command without output; shows its output if it fails.
 quietly() {
   local log
   log=$(mktemp)
@@ -30,6 +30,21 @@ quietly() {
     echo "failed: $*" >&2
     return "$code"
   fi
+}
+
+# Runs a build. Its progress is shown on a terminal, elsewhere only the output of a build that fails.
+watched() {
+  if [ -t 2 ]; then "$@" >&2 </dev/null; else quietly "$@"; fi
+}
+
+# Runs ctest with the arguments and shows the tests that did not pass; on a terminal also how many have run.
+run_tests() {
+  local terminal=0
+  if [ -t 2 ]; then terminal=1; fi
+  ctest "$@" </dev/null | awk -v terminal="$terminal" '
+    $1 == "Start" { next }
+    / Passed / { if (terminal) printf "\r[%s] ", $1 >"/dev/stderr"; next }
+    { print }'
 }
 
 as_root() {
@@ -49,15 +64,15 @@ install_packages() {
   quietly as_root env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "${missing[@]}"
 }
 
-# Builds Release: the given targets, or everything. Tests are configured only where they are asked for.
+# Builds Release: the given targets, or everything with the tests.
 build_release() {
   say "building in $root/build/release (minutes the first time)"
+  cd "$root"
   if [ $# = 0 ]; then
-    (cd "$root" && quietly cmake --preset release -DBUILD_TESTING=ON && quietly cmake --build --preset release)
+    quietly cmake --preset release -DBUILD_TESTING=ON
+    watched cmake --build --preset release
   else
-    if [ ! -f "$root/build/release/build.ninja" ]; then
-      (cd "$root" && quietly cmake --preset release -DBUILD_TESTING=OFF)
-    fi
-    (cd "$root" && quietly cmake --build --preset release --target "$@")
+    if [ ! -f build/release/build.ninja ]; then quietly cmake --preset release; fi
+    watched cmake --build --preset release --target "$@"
   fi
 }

@@ -1,18 +1,26 @@
 #!/usr/bin/env bash
-# Holds the sources against .clang-format and .clang-tidy. Only what has changed since the last time is read again.
+# Checks the sources against .clang-format and .clang-tidy, and the length of files. clang-tidy reads again only what has
+# changed since the last time.
 #
-#     tests/lint.sh [TARGET ...]      the program's sources, or those of other targets, such as io_test or all
+#     tests/lint.sh [all]      clang-tidy over the program's sources; all: over those of the tests too
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/../cmake/setup.sh"
 
 install_packages "${program_packages[@]}" "${test_packages[@]}" "${lint_packages[@]}"
 cd "$root"
 
-find vdbdither io ops tests \( -name '*.h' -o -name '*.cpp' \) -print0 | xargs --null clang-format-14 --dry-run -Werror
+find vdbdither io ops tests cmake \( -name '*.h' -o -name '*.cpp' \) -print0 | xargs --null clang-format-14 --dry-run -Werror
 
-# A build by clang that has clang-tidy read every source first. It has no use for optimized code.
+# A longer file holds more than one concept.
+long_files=$(find vdbdither io ops tests cmake \( -name '*.h' -o -name '*.cpp' -o -name '*.py' \) -print0 |
+  xargs --null wc --lines | awk '$2 != "total" && $1 > 600 { print $2 ": " $1 " lines, the maximum is 600" }')
+if [ -n "$long_files" ]; then
+  echo "$long_files" >&2
+  exit 1
+fi
+
 say "linting in $root/build/lint (minutes the first time)"
-quietly cmake --preset clang -B build/lint -DCMAKE_BUILD_TYPE=Debug -DBUILD_TESTING=ON \
-  -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON '-DCMAKE_CXX_CLANG_TIDY=clang-tidy-14;--quiet'
-if [ $# = 0 ]; then set -- vdbdither_program; fi
-quietly cmake --build build/lint --target "$@" -- -k 0
+quietly cmake --preset lint
+targets=(tidy)
+if [ "${1:-}" = all ]; then targets+=(tidy_tests); fi
+watched cmake --build --preset lint --target "${targets[@]}" -- -k 0

@@ -6,6 +6,5 @@ source "$(dirname "${BASH_SOURCE[0]}")/../cmake/setup.sh"
 install_packages "${program_packages[@]}" "${test_packages[@]}"
 build_release
 
-# Tests that pass are not worth a line each.
-cd "$root"
-ctest --preset release --parallel "$jobs" "$@" </dev/null | grep --extended-regexp --invert-match '^ +Start |  Passed '
+say "running the tests"
+run_tests --preset release --parallel "$jobs" "$@"

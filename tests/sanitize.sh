@@ -42,7 +42,7 @@ cd "$root"
 if [ "$preset" = tsan ]; then build_tbb "$root/build/tsan/tbb"; fi
 say "building in $root/build/$preset (minutes the first time)"
 quietly cmake --preset "$preset"
-quietly cmake --build --preset "$preset"
+watched cmake --build --preset "$preset"
 
 # Each line: whom it concerns, a regular expression of names, and why.
 unsuited=()
@@ -54,6 +54,6 @@ while read -r whom names reason; do
 done < <(grep --invert-match --extended-regexp '^(#|$)' tests/support/sanitizers/unsuited.txt)
 excluded=$(IFS='|' && echo "${unsuited[*]}")
 
-# A test that takes seconds without takes a minute with them: no more at a time than there are cores.
-ctest --preset "$preset" --parallel "$jobs" --exclude-regex "^(${excluded:-none})\$" "$@" </dev/null |
-  grep --extended-regexp --invert-match '^ +Start |  Passed '
+# A test that takes seconds without them takes a minute with them: no more at a time than there are cores.
+say "running the tests"
+run_tests --preset "$preset" --parallel "$jobs" --exclude-regex "^(${excluded:-none})\$" "$@"

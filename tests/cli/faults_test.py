@@ -138,6 +138,17 @@ class InTheWay(ProgramTest):
                 ("measure", "part.stl", "--reference", "part.stl", "--report", f"{place}/out.json"),
                 ("measure", "part.stl", "--reference", "part.stl", "--map", f"{place}/out.ply"))
 
+    def as_nobody(self):
+        """The keywords that run the program as a user without rights. Skips the test where only root may run the program."""
+        keywords = {"user": 65534, "group": 65534, "extra_groups": []}
+        try:
+            runs = self.run_program("--version", **keywords).returncode == 0
+        except PermissionError:
+            runs = False
+        if not runs:
+            self.skipTest("only root may run the program where it lies")
+        return keywords
+
     def test_a_read_only_folder_is_reported(self):
         place = self.folder / "locked"
         place.mkdir()
@@ -145,13 +156,9 @@ class InTheWay(ProgramTest):
         keywords = {}
         if os.geteuid() == 0:
             # root may write everywhere.
-            nobody = 65534
             for path in (self.folder, self.folder / "part.stl", self.folder / "part.vdb"):
                 path.chmod(0o755)
-            probe = self.run_program("--version", user=nobody, group=nobody)
-            if probe.returncode != 0:
-                self.skipTest("the program is where only root may run it")
-            keywords = {"user": nobody, "group": nobody, "extra_groups": []}
+            keywords = self.as_nobody()
         for arguments in self.sinks("locked"):
             self.refuse(1, "Permission denied", *arguments, **keywords)
 
@@ -161,9 +168,7 @@ class InTheWay(ProgramTest):
             (self.folder / name).chmod(0)
         if os.geteuid() == 0:
             self.folder.chmod(0o755)
-            if self.run_program("--version", user=65534, group=65534).returncode != 0:
-                self.skipTest("the program is where only root may run it")
-            keywords = {"user": 65534, "group": 65534, "extra_groups": []}
+            keywords = self.as_nobody()
         self.refuse(1, "'part.stl': cannot be opened: Permission denied", "mesh2sdf", "part.stl", *MIMAKI, "-o", "x.vdb", **keywords)
         self.refuse(1, "cannot read 'part.vdb': Permission denied", "normals", "-i", "part.vdb", "-o", "x.vdb", **keywords)
 

@@ -183,8 +183,12 @@ complete --command vdbdither --condition '__vdbdither_verb' --no-files
 /// In single quotes as fish takes it: backslashes keep their meaning before quotes.
 std::string fishQuoted(const std::string& text) {
   std::string result = "'";
-  for (const char c : text) result += (c == '\'' || c == '\\' ? "\\" : "") + std::string(1, c);
-  return result + "'";
+  for (const char c : text) {
+    if (c == '\'' || c == '\\') result += '\\';
+    result += c;
+  }
+  result += '\'';
+  return result;
 }
 
 /// The words of an option, each with a tab and what it does.
