@@ -51,7 +51,7 @@ class MeshToSdf : public Source {
   Schema plan() override {
     Schema schema;
     const Vec3d pitch_mm = targetPitchMm(target_, schema);
-    held_band_mm_ = band_.leastMm(pitch_mm);
+    held_band_mm_ = band_.minimumMm(pitch_mm);
     std::vector<Mesh> meshes = readMeshes();
     const double tie_mm = placed(meshes, pitch_mm);
     questionSize(meshes, schema);
@@ -184,7 +184,7 @@ class MeshToSdf : public Source {
   void questionSize(std::span<const Mesh> meshes, const Schema& schema) const {
     // 3 m and 0.1 mm, as far as floats of a file tell.
     constexpr double largest_mm = 3000 * (1 - 1e-6);
-    constexpr double least_mm = 0.1 * (1 + 1e-6);
+    constexpr double minimum_mm = 0.1 * (1 + 1e-6);
     const auto profile = schema.metadata.find(printer_key);
     const Vec3d build_mm = profile == schema.metadata.end()
                                ? Vec3d(0.0)
@@ -195,7 +195,7 @@ class MeshToSdf : public Source {
     const auto rounded = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4); };
     const std::string is = "the part is " + rounded(size_mm.x()) + " x " + rounded(size_mm.y()) +
                            " x " + rounded(size_mm.z()) + " mm";
-    if (longest_mm >= largest_mm || (longest_mm > 0 && longest_mm <= least_mm)) {
+    if (longest_mm >= largest_mm || (longest_mm > 0 && longest_mm <= minimum_mm)) {
       report().warn(is + "; " + likelierUnit(longest_mm));
     } else if (build_mm != Vec3d(0, 0, 0) &&
                (size_mm.x() > build_mm.x() || size_mm.y() > build_mm.y() ||
@@ -229,7 +229,7 @@ class MeshToSdf : public Source {
   /// The voxels within a voxel diagonal, or the band, of the mesh's bounding box.
   [[nodiscard]] Lattice latticeOfMesh(const Mesh& mesh, const Vec3d& pitch_mm) const {
     const MeshBounds bounds = boundsOf(mesh);
-    const double margin_mm = std::max(pitch_mm.length(), band_.greatestMm(pitch_mm));
+    const double margin_mm = std::max(pitch_mm.length(), band_.maximumMm(pitch_mm));
     return latticeAround(bounds.min, bounds.max, margin_mm, pitch_mm, refine_y_);
   }
 
@@ -239,7 +239,7 @@ class MeshToSdf : public Source {
     const Lattice& lattice = schema.lattice;
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
     const double low = lattice.layers().begin * lattice.pitch_mm.z();
-    const double band_mm = band_.greatestMm(lattice.pitch_mm);
+    const double band_mm = band_.maximumMm(lattice.pitch_mm);
     const int top_row = lattice.layers().size() / leaf_layers + 1;
     std::vector<double> rows(static_cast<std::size_t>(top_row) + 1, 0.0);
     const auto rowAt = [&](double z_mm) {

@@ -116,13 +116,13 @@ class Offset : public Filter {
 
   /// What is left of the band must do for the dither.
   void checkBand() const {
-    const double needed_mm = offset_.greatestMm() + offset_.lattice.diagonalMm();
+    const double needed_mm = offset_.maximumMm() + offset_.lattice.diagonalMm();
     if (offset_.held_mm * (1 + 1e-6) >= needed_mm) return;
     const double asked_mm = std::ceil(needed_mm * 1e3) / 1e3;
     throw DataError("grid 'surface' holds distances up to " +
                     shortestText(std::floor(offset_.held_mm * 1e4 + 0.01) / 1e4) +
                     " mm everywhere, and offsets up to " +
-                    shortestText(std::round(offset_.greatestMm() * 1e4) / 1e4) + " mm need " +
+                    shortestText(std::round(offset_.maximumMm() * 1e4) / 1e4) + " mm need " +
                     shortestText(asked_mm) + " mm: mesh2sdf --band " + shortestText(asked_mm) +
                     "mm");
   }

@@ -89,13 +89,13 @@ class Resample : public Source {
     const Band band{1, band_mm_.value_or(0)};
     schema.lattice =
         latticeAround(bounds.min, bounds.max, std::max(pitch_mm.length(), band.mm), pitch_mm);
-    const double leaves = leavesOf(schema.lattice, band.greatestMm(pitch_mm));
+    const double leaves = leavesOf(schema.lattice, band.maximumMm(pitch_mm));
     const double at_surface =
-        leavesOf(schema.lattice, std::min(band.greatestMm(pitch_mm), pitch_mm.length()));
+        leavesOf(schema.lattice, std::min(band.maximumMm(pitch_mm), pitch_mm.length()));
     // The surface is taken to be spread evenly over the layers, but for a factor of two.
     const double rows = schema.lattice.layers().size() / static_cast<double>(leaf_layers) + 1;
     schema.footprint = {2 * leaves / rows, leaves, at_surface};
-    held_band_mm_ = band.leastMm(pitch_mm);
+    held_band_mm_ = band.minimumMm(pitch_mm);
     field_ = std::make_unique<ZeroSetDistance>(surface_, schema.lattice, band, slack_mm_);
     const int bottom = schema.lattice.layers().begin;
     schema.grids = run({bottom, bottom});
@@ -187,7 +187,7 @@ class Resample : public Source {
     if (!(std::abs(map.det()) > 0))
       throw DataError("grid '" + grid_name_ + "' has a transform without volume");
     const ZeroSet::Reading reading = readingOf(*grid);
-    const double least_mm = std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
+    const double minimum_mm = std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
     double cell_mm = 0;
     double faces_mm2 = 0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -197,7 +197,7 @@ class Resample : public Source {
     }
     // Divisions are larger than voxels for speed; what is off, by about an eighth of a division's
     // square over the cell where the surface bends within one, is corrected and added to the band.
-    const double divisions = std::clamp(std::ceil(std::sqrt(cell_mm / least_mm) / 2), 1.0, 8.0);
+    const double divisions = std::clamp(std::ceil(std::sqrt(cell_mm / minimum_mm) / 2), 1.0, 8.0);
     slack_mm_ = cell_mm / (8 * divisions * divisions);
     division_mm2_ = faces_mm2 / 3 / (divisions * divisions);
     const auto made = [&](const Mat4d& placed) {

@@ -141,7 +141,7 @@ class Ssim : public Tool {
     }
     if (!pixels.empty()) return pixels;
     throw DataError(opaque ? "'" + reference_file_ + "' has " + sizeText(picture) +
-                                 " pixels; 11 x 11 is the least"
+                                 " pixels; the minimum is 11 x 11"
                            : "'" + reference_file_ + "' shows nothing: all of it is transparent");
   }
 

@@ -16,7 +16,7 @@ HeightMap::HeightMap(std::vector<float> heights_mm, int width, int height, int a
       pixel_mm_(pixel_mm),
       corner_mm_(corner_mm),
       minimum_mm_(double{*std::min_element(heights_mm_.begin(), heights_mm_.end())}),
-      greatest_mm_(double{*std::max_element(heights_mm_.begin(), heights_mm_.end())}) {}
+      maximum_mm_(double{*std::max_element(heights_mm_.begin(), heights_mm_.end())}) {}
 
 double HeightMap::at(const openvdb::Vec3d& position_mm) const {
   const double x = (position_mm[across_] - corner_mm_[0]) / pixel_mm_ - 0.5;

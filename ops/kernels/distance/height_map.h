@@ -22,8 +22,8 @@ class HeightMap {
   [[nodiscard]] double at(const openvdb::Vec3d& position_mm) const;
 
   /// The minimum and the maximum height.
-  [[nodiscard]] double leastMm() const { return minimum_mm_; }
-  [[nodiscard]] double greatestMm() const { return greatest_mm_; }
+  [[nodiscard]] double minimumMm() const { return minimum_mm_; }
+  [[nodiscard]] double maximumMm() const { return maximum_mm_; }
 
  private:
   std::vector<float> heights_mm_;
@@ -31,7 +31,7 @@ class HeightMap {
   int across_, up_;  ///< the axes
   double pixel_mm_;
   openvdb::Vec2d corner_mm_;
-  double minimum_mm_, greatest_mm_;
+  double minimum_mm_, maximum_mm_;
 };
 
 }  // namespace vdbdither

@@ -87,40 +87,166 @@ constexpr double rounding_mm = 1e-9;
   distance = outermost > 0 ? far : distance;
 }
 
-template <int rank, bool track>
-[[gnu::always_inline]] inline void lowerBy(const LatticeRegion& region, std::uint32_t name,
-                                           LeafDistances& leaves) {
-  const openvdb::Coord& base = region.base;
-  const openvdb::Coord first = region.reach.min() - base;
-  const openvdb::Coord last = region.reach.max() - base;
-  // Regions of a few planes are not narrowed further.
-  constexpr int few = 8;
-
-  const double k_first = first.z();
-  const double k_last = last.z();
+/// The bounds of a region solved for z: it lies above the floors, below the ceilings, and behind
+/// the walls, which are parallel to z.
+struct BoundsAlongZ {
   std::array<Limit, LatticeRegion::max_bounds> floors, ceilings, walls;
   std::size_t floor_count = 0;
   std::size_t ceiling_count = 0;
   std::size_t wall_count = 0;
+};
+
+template <int rank>
+[[gnu::always_inline]] inline BoundsAlongZ boundsAlongZ(const LatticeRegion& region) {
+  BoundsAlongZ bounds;
   for (int b = 0; b < region.bounds; ++b) {
     const LatticeForm& form = region.bound[static_cast<std::size_t>(b)];
     constexpr double level = 1e-100;
     const bool side = rank == 1 && b < std::ssize(region.side);
     const double inwards_mm = side ? region.spread_mm + rounding_mm : 0;
     if (std::abs(form.z) < level) {
-      walls[wall_count++] = {form.x, form.y, form.constant, inwards_mm};
+      bounds.walls[bounds.wall_count++] = {form.x, form.y, form.constant, inwards_mm};
       continue;
     }
     const double inverse = -1 / form.z;
     const Limit limit{form.x * inverse, form.y * inverse, form.constant * inverse,
                       inwards_mm * std::abs(inverse)};
     if (form.z > 0) {
-      floors[floor_count++] = limit;
+      bounds.floors[bounds.floor_count++] = limit;
     } else {
-      ceilings[ceiling_count++] = limit;
+      bounds.ceilings[bounds.ceiling_count++] = limit;
     }
   }
+  return bounds;
+}
 
+/// The voxels [begin, end] of four columns along x that lie in a region. For rank 1 those in
+/// [inner_low, inner_high] lie over the triangle.
+struct FourColumns {
+  Integers begin, end;
+  Doubles inner_low, inner_high;
+
+  bool empty() const {
+    const Integers some = begin <= end;
+    const auto& halves = reinterpret_cast<const Halves&>(some);
+    return (halves[0] | halves[1]) == 0;
+  }
+};
+
+/// The bounds in one row of columns along x: what they have in common at one j.
+class RowBounds {
+ public:
+  [[gnu::always_inline]] RowBounds(const BoundsAlongZ& bounds, int j, double k_first, double k_last)
+      : bounds_(bounds), j_(j), k_first_(k_first), k_last_(k_last) {
+    for (std::size_t f = 0; f < bounds.floor_count; ++f)
+      floors_[f] = bounds.floors[f].constant + bounds.floors[f].y * j;
+    for (std::size_t c = 0; c < bounds.ceiling_count; ++c)
+      ceilings_[c] = bounds.ceilings[c].constant + bounds.ceilings[c].y * j;
+  }
+
+  /// Those of the columns i, i + 1, i + 2, i + 3 that lie before i_end.
+  [[gnu::always_inline]] FourColumns columns(int i, int i_end) const {
+    const Doubles columns = ramp + static_cast<double>(i);
+    Doubles low = Doubles{} + k_first_;
+    Doubles high = Doubles{} + k_last_;
+    Doubles inner_low = low;
+    Doubles inner_high = high;
+    for (std::size_t f = 0; f < bounds_.floor_count; ++f) {
+      const Doubles at = columns * bounds_.floors[f].x + floors_[f];
+      low = at > low ? at : low;
+      const Doubles inner = at + bounds_.floors[f].inwards;
+      inner_low = inner > inner_low ? inner : inner_low;
+    }
+    for (std::size_t c = 0; c < bounds_.ceiling_count; ++c) {
+      const Doubles at = columns * bounds_.ceilings[c].x + ceilings_[c];
+      high = at < high ? at : high;
+      const Doubles inner = at - bounds_.ceilings[c].inwards;
+      inner_high = inner < inner_high ? inner : inner_high;
+    }
+    for (std::size_t w = 0; w < bounds_.wall_count; ++w) {
+      const Limit& wall = bounds_.walls[w];
+      const Doubles at = columns * wall.x + (wall.constant + wall.y * j_);
+      high = at < 0 ? Doubles{} + nowhere : high;
+      inner_high = at < wall.inwards ? Doubles{} + nowhere : inner_high;
+    }
+    high = columns < static_cast<double>(i_end) ? high : Doubles{} + nowhere;
+    low = low < k_last_ + 1 ? low : Doubles{} + (k_last_ + 1);
+    high = high > nowhere ? high : Doubles{} + nowhere;
+    // Conversion truncates positive and negative numbers.
+    Doubles begin = __builtin_convertvector(__builtin_convertvector(low, Integers), Doubles);
+    begin = begin < low ? begin + 1 : begin;
+    Doubles end = __builtin_convertvector(__builtin_convertvector(high, Integers), Doubles);
+    end = end > high ? end - 1 : end;
+    return {__builtin_convertvector(begin, Integers), __builtin_convertvector(end, Integers),
+            inner_low, inner_high};
+  }
+
+ private:
+  const BoundsAlongZ& bounds_;
+  int j_;
+  double k_first_, k_last_;
+  std::array<double, LatticeRegion::max_bounds> floors_, ceilings_;
+};
+
+/// Lowers the distances of the voxels of column (i, j) from k_begin to k_end. Those below over_low
+/// and above over_high lie beside the triangle of a region of rank 1.
+template <int rank, bool track>
+[[gnu::always_inline]] inline void lowerColumn(const LatticeRegion& region, std::uint32_t name,
+                                               LeafDistances& leaves, int i, int j, int k_begin,
+                                               int k_end, double over_low, double over_high) {
+  const openvdb::Coord leaf_base = (region.base >> 3) - leaves.leaves().min();
+  std::array<double, rank> column;
+  for (std::size_t f = 0; f < rank; ++f) {
+    const LatticeForm& form = region.distance[f];
+    column[f] = form.constant + form.x * i + form.y * j;
+  }
+  const std::size_t slot =
+      static_cast<std::size_t>(leaf_base.x() + (i >> 3)) * leaves.stride() +
+      static_cast<std::size_t>(leaf_base.y() + (j >> 3)) * LeafDistances::depth;
+  const int row = (i & 7) * edge * edge + (j & 7) * edge;
+  for (int k = k_begin & ~(lanes - 1); k <= k_end; k += lanes) {
+    Floats distance;
+    if constexpr (rank == 1) {
+      Doubles form = ramp * region.distance[0].z + (column[0] + region.distance[0].z * k);
+      if (std::max(k, k_begin) < over_low || std::min(k + (lanes - 1), k_end) > over_high)
+        measureToTriangle(region, i, j, k, form);
+      distance = __builtin_convertvector(form, Floats);
+      reinterpret_cast<Integers&>(distance) &= 0x7fffffff;
+    } else {
+      Doubles squared{};
+      for (std::size_t f = 0; f < rank; ++f) {
+        const Doubles form = ramp * region.distance[f].z + (column[f] + region.distance[f].z * k);
+        squared += form * form;
+      }
+      for (int l = 0; l < lanes; ++l) squared[l] = std::sqrt(squared[l]);
+      distance = __builtin_convertvector(squared, Floats);
+    }
+    const std::size_t at = slot + static_cast<std::size_t>(leaf_base.z() + (k >> 3));
+    float* leaf = leaves.distances(at);
+    if (leaf == nullptr) leaf = leaves.make(at);
+    const int offset = row + (k & 7);
+    auto& nearest = *reinterpret_cast<Floats*>(leaf + offset);
+    const Integers ks = integer_ramp + k;
+    const Integers take = (ks >= k_begin) & (ks <= k_end) & (distance < nearest);
+    nearest = take ? distance : nearest;
+    if constexpr (track) {
+      auto& names = *reinterpret_cast<Integers*>(leaves.names(at) + offset);
+      names = take ? Integers{} + static_cast<std::int32_t>(name) : names;
+    }
+  }
+}
+
+template <int rank, bool track>
+[[gnu::always_inline]] inline void lowerBy(const LatticeRegion& region, std::uint32_t name,
+                                           LeafDistances& leaves) {
+  const openvdb::Coord first = region.reach.min() - region.base;
+  const openvdb::Coord last = region.reach.max() - region.base;
+  // Regions of a few planes are not narrowed further.
+  constexpr int few = 8;
+
+  const double k_first = first.z();
+  const double k_last = last.z();
+  const BoundsAlongZ bounds = boundsAlongZ<rank>(region);
   double j_low = first.y();
   double j_high = last.y();
   if (last.y() - first.y() >= few) {
@@ -133,9 +259,6 @@ template <int rank, bool track>
     }
     if (!(j_low <= j_high)) return;
   }
-  const Doubles rise_of_first = ramp * region.distance[0].z;
-  const Doubles rise_of_second = ramp * region.distance[1].z;
-  const openvdb::Coord leaf_base = (base >> 3) - leaves.leaves().min();
 
   for (int j = roundedUp(j_low); j <= roundedDown(j_high); ++j) {
     double i_low = first.x();
@@ -149,100 +272,15 @@ template <int rank, bool track>
       if (!(i_low <= i_high)) continue;
     }
     const int i_end = roundedDown(i_high) + 1;
-    std::array<double, LatticeRegion::max_bounds> floor_rows, ceiling_rows;
-    for (std::size_t f = 0; f < floor_count; ++f)
-      floor_rows[f] = floors[f].constant + floors[f].y * j;
-    for (std::size_t c = 0; c < ceiling_count; ++c)
-      ceiling_rows[c] = ceilings[c].constant + ceilings[c].y * j;
-    const std::size_t slot_of_row =
-        static_cast<std::size_t>(leaf_base.y() + (j >> 3)) * LeafDistances::depth;
+    const RowBounds row(bounds, j, k_first, k_last);
     for (int i = roundedUp(i_low); i < i_end; i += lanes) {
-      const Doubles columns = ramp + static_cast<double>(i);
-      Doubles low = Doubles{} + k_first;
-      Doubles high = Doubles{} + k_last;
-      // For rank 1, where the column is over the triangle.
-      Doubles inner_low = low;
-      Doubles inner_high = high;
-      for (std::size_t f = 0; f < floor_count; ++f) {
-        const Doubles at = columns * floors[f].x + floor_rows[f];
-        low = at > low ? at : low;
-        const Doubles inner = at + floors[f].inwards;
-        inner_low = inner > inner_low ? inner : inner_low;
-      }
-      for (std::size_t c = 0; c < ceiling_count; ++c) {
-        const Doubles at = columns * ceilings[c].x + ceiling_rows[c];
-        high = at < high ? at : high;
-        const Doubles inner = at - ceilings[c].inwards;
-        inner_high = inner < inner_high ? inner : inner_high;
-      }
-      for (std::size_t w = 0; w < wall_count; ++w) {
-        const Doubles at = columns * walls[w].x + (walls[w].constant + walls[w].y * j);
-        high = at < 0 ? Doubles{} + nowhere : high;
-        inner_high = at < walls[w].inwards ? Doubles{} + nowhere : inner_high;
-      }
-      high = columns < static_cast<double>(i_end) ? high : Doubles{} + nowhere;
-      low = low < k_last + 1 ? low : Doubles{} + (k_last + 1);
-      high = high > nowhere ? high : Doubles{} + nowhere;
-      // Conversion truncates positive and negative numbers.
-      Doubles begin = __builtin_convertvector(__builtin_convertvector(low, Integers), Doubles);
-      begin = begin < low ? begin + 1 : begin;
-      Doubles end = __builtin_convertvector(__builtin_convertvector(high, Integers), Doubles);
-      end = end > high ? end - 1 : end;
-      const Integers begins = __builtin_convertvector(begin, Integers);
-      const Integers ends = __builtin_convertvector(end, Integers);
-      const Integers some = begins <= ends;
-      const auto& halves = reinterpret_cast<const Halves&>(some);
-      if ((halves[0] | halves[1]) == 0) continue;
-
-      for (int lane = 0; lane < lanes; ++lane) {
-        const int k_begin = begins[lane];
-        const int k_end = ends[lane];
-        if (k_end < k_begin) continue;
-        const int x = i + lane;
-        const double over_low = inner_low[lane];
-        const double over_high = inner_high[lane];
-        std::array<double, rank> column;
-        for (std::size_t f = 0; f < rank; ++f) {
-          const LatticeForm& form = region.distance[f];
-          column[f] = form.constant + form.x * x + form.y * j;
-        }
-        const std::size_t slot =
-            static_cast<std::size_t>(leaf_base.x() + (x >> 3)) * leaves.stride() + slot_of_row;
-        const int row = (x & 7) * edge * edge + (j & 7) * edge;
-        for (int k = k_begin & ~(lanes - 1); k <= k_end; k += lanes) {
-          Floats distance;
-          if constexpr (rank == 1) {
-            Doubles form = rise_of_first + (column[0] + region.distance[0].z * k);
-            if (std::max(k, k_begin) < over_low || std::min(k + (lanes - 1), k_end) > over_high)
-              measureToTriangle(region, x, j, k, form);
-            distance = __builtin_convertvector(form, Floats);
-            reinterpret_cast<Integers&>(distance) &= 0x7fffffff;
-          } else {
-            const Doubles one = rise_of_first + (column[0] + region.distance[0].z * k);
-            const Doubles two = rise_of_second + (column[1] + region.distance[1].z * k);
-            Doubles squared = one * one + two * two;
-            if constexpr (rank == 3) {
-              const Doubles three =
-                  ramp * region.distance[2].z + (column[2] + region.distance[2].z * k);
-              squared += three * three;
-            }
-            for (int l = 0; l < lanes; ++l) squared[l] = std::sqrt(squared[l]);
-            distance = __builtin_convertvector(squared, Floats);
-          }
-          const std::size_t at = slot + static_cast<std::size_t>(leaf_base.z() + (k >> 3));
-          float* leaf = leaves.distances(at);
-          if (leaf == nullptr) leaf = leaves.make(at);
-          const int offset = row + (k & 7);
-          auto& nearest = *reinterpret_cast<Floats*>(leaf + offset);
-          const Integers ks = integer_ramp + k;
-          const Integers take = (ks >= k_begin) & (ks <= k_end) & (distance < nearest);
-          nearest = take ? distance : nearest;
-          if constexpr (track) {
-            auto& names = *reinterpret_cast<Integers*>(leaves.names(at) + offset);
-            names = take ? Integers{} + static_cast<std::int32_t>(name) : names;
-          }
-        }
-      }
+      const FourColumns columns = row.columns(i, i_end);
+      if (columns.empty()) continue;
+      for (int lane = 0; lane < lanes; ++lane)
+        if (columns.begin[lane] <= columns.end[lane])
+          lowerColumn<rank, track>(region, name, leaves, i + lane, j, columns.begin[lane],
+                                   columns.end[lane], columns.inner_low[lane],
+                                   columns.inner_high[lane]);
     }
   }
 }

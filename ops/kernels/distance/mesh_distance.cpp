@@ -59,23 +59,23 @@ class Bins {
 double tieWithin(const Mesh& mesh, const Lattice& lattice, double asked_mm) {
   // Far above the rounding of products and sums in double precision.
   constexpr double rounding = 0x1p-44;
-  double greatest_mm = 0;
+  double maximum_mm = 0;
   for (const Vec3d& v : mesh.vertices)
     for (int axis = 0; axis < 3; ++axis)
-      greatest_mm = std::max(greatest_mm, std::abs(v[axis]) + std::abs(lattice.origin_mm[axis]));
+      maximum_mm = std::max(maximum_mm, std::abs(v[axis]) + std::abs(lattice.origin_mm[axis]));
   const Vec3d& pitch_mm = lattice.pitch_mm;
-  return std::min(std::max(asked_mm, rounding * greatest_mm),
+  return std::min(std::max(asked_mm, rounding * maximum_mm),
                   std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()}) / 4);
 }
 
 /// Returns the maximum band, in diameters, of the normals whose components are at least `least`.
-double bandAcross(const Vec3d& least, const Vec3d& pitch_mm) {
+double bandAcross(const Vec3d& minimum_normal, const Vec3d& pitch_mm) {
   double inverse_diameter = 1 / pitch_mm.length();
   double step_mm = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    const double u = least[(axis + 1) % 3];
-    const double v = least[(axis + 2) % 3];
-    inverse_diameter = std::max(inverse_diameter, least[axis] / pitch_mm[axis]);
+    const double u = minimum_normal[(axis + 1) % 3];
+    const double v = minimum_normal[(axis + 2) % 3];
+    inverse_diameter = std::max(inverse_diameter, minimum_normal[axis] / pitch_mm[axis]);
     step_mm = std::max(step_mm, pitch_mm[axis] * std::sqrt(std::max(0.0, 1 - u * u - v * v)));
   }
   return std::max(1 / inverse_diameter, step_mm);
@@ -91,12 +91,12 @@ MeshDistance::MeshDistance(const Mesh& mesh, const Lattice& lattice, Band band,
       extras_(extras),
       features_(mesh, walls, lattice.origin_mm, lattice.pitch_mm.z() * leaf_layers,
                 lattice.pitch_mm.y() * leaf_layers * Block::leaf_rows,
-                band.greatestMm(lattice.pitch_mm)) {
+                band.maximumMm(lattice.pitch_mm)) {
   if (band_.mm > 0) return;
   triangle_band_mm_.resize(features_.triangles());
   tbb::parallel_for(std::uint32_t{0}, features_.triangles(), [&](std::uint32_t t) {
     triangle_band_mm_[t] = static_cast<float>(
-        bandAcross(features_.leastNormal(t), lattice_.pitch_mm) * band_.diameters);
+        bandAcross(features_.minimumNormal(t), lattice_.pitch_mm) * band_.diameters);
   });
   for (const float band_mm : triangle_band_mm_) widest_mm_ = std::max(widest_mm_, double{band_mm});
 }

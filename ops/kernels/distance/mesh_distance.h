@@ -26,12 +26,12 @@ struct Band {
   double mm = 0;  ///< the same distance everywhere; replaces diameters if not zero
 
   /// Returns its maximum on a lattice of this pitch.
-  [[nodiscard]] double greatestMm(const openvdb::Vec3d& pitch_mm) const {
+  [[nodiscard]] double maximumMm(const openvdb::Vec3d& pitch_mm) const {
     return mm > 0 ? mm : diameters * pitch_mm.length();
   }
 
   /// Returns its minimum: distances up to it are held everywhere.
-  [[nodiscard]] double leastMm(const openvdb::Vec3d& pitch_mm) const {
+  [[nodiscard]] double minimumMm(const openvdb::Vec3d& pitch_mm) const {
     return mm > 0 ? mm : diameters * std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
   }
 };
@@ -85,7 +85,7 @@ class MeshDistance {
   /// nearest edge or vertex).
   [[nodiscard]] DistanceGrids run(ZRange core) const;
 
-  [[nodiscard]] double backgroundMm() const { return band_.greatestMm(lattice_.pitch_mm); }
+  [[nodiscard]] double backgroundMm() const { return band_.maximumMm(lattice_.pitch_mm); }
 
   /// Centres nearer than this to the surface lie on it: the length asked for, but above the
   /// rounding of the mesh's own coordinates and at most a quarter of the smallest pitch.

@@ -123,9 +123,9 @@ void MeshDistance::Block::enter(std::uint32_t triangle) {
     });
   }
   if (!all_.hasFeatures(triangle)) return;
-  const CoordBBox reach = reachOf(low - greatest_mm_, high + greatest_mm_);
+  const CoordBBox reach = reachOf(low - maximum_mm_, high + maximum_mm_);
   if (reach.empty()) return;
-  double band_mm = greatest_mm_;
+  double band_mm = maximum_mm_;
   if (!work_.bands_mm.empty()) {
     // The widest band of the leaves that it can reach.
     float widest_mm = 0;
@@ -235,7 +235,7 @@ void MeshDistance::Block::makeLeaf(const Coord& leaf_index, const LeafBits& insi
   const std::size_t slot = work_.distances.slot(leaf_index);
   const float* distances = work_.distances.distances(slot);
   const float band_mm =
-      work_.bands_mm.empty() ? static_cast<float>(greatest_mm_) : work_.bands_mm[slot];
+      work_.bands_mm.empty() ? static_cast<float>(maximum_mm_) : work_.bands_mm[slot];
 
   const LeafBits exists = existing(origin);
   LeafBits within;
@@ -250,7 +250,7 @@ void MeshDistance::Block::makeLeaf(const Coord& leaf_index, const LeafBits& insi
   leaf.surface.reset(newLeaf<openvdb::FloatTree>(origin));
   const LeafBits active = kernels_.finish(
       distances ? distances : far.data(), within, exists, static_cast<float>(field_.tie_mm_),
-      band_mm, static_cast<float>(greatest_mm_), leaf.surface->buffer().data());
+      band_mm, static_cast<float>(maximum_mm_), leaf.surface->buffer().data());
   const bool any_active =
       std::any_of(active.begin(), active.end(), [](std::uint64_t bits) { return bits != 0; });
   if (!any_active && !any_inside) return;

@@ -65,9 +65,9 @@ class MeshDistance::Block {
         per_mm_(1.0 / pitch_mm_.x(), 1.0 / pitch_mm_.y(), 1.0 / pitch_mm_.z()),
         voxels_(voxels),
         leaves_(voxels.min() >> 3, voxels.max() >> 3),
-        greatest_mm_(field.backgroundMm()),
-        low_mm_(voxels.min().asVec3d() * pitch_mm_ - std::max(greatest_mm_, field.tie_mm_)),
-        high_mm_(voxels.max().asVec3d() * pitch_mm_ + std::max(greatest_mm_, field.tie_mm_)),
+        maximum_mm_(field.backgroundMm()),
+        low_mm_(voxels.min().asVec3d() * pitch_mm_ - std::max(maximum_mm_, field.tie_mm_)),
+        high_mm_(voxels.max().asVec3d() * pitch_mm_ + std::max(maximum_mm_, field.tie_mm_)),
         crossings_(pitch_mm_, field.tie_mm_ / RowCrossings::tie_roundings),
         kernels_(leafKernels()),
         work_(workspace) {}
@@ -92,7 +92,7 @@ class MeshDistance::Block {
   openvdb::Vec3d per_mm_;  ///< voxels
   openvdb::CoordBBox voxels_;
   openvdb::CoordBBox leaves_;
-  double greatest_mm_;
+  double maximum_mm_;
   openvdb::Vec3d low_mm_, high_mm_;  ///< the range that can affect the voxels
   RowCrossings crossings_;
   const LeafKernels& kernels_;

@@ -90,10 +90,10 @@ Vec3d componentMax(const Vec3d& a, const Vec3d& b) { return openvdb::math::maxCo
 }  // namespace
 
 MeshFeatures::MeshFeatures(const Mesh& mesh, const SwallowedWalls& walls, const Vec3d& origin_mm,
-                           double layer_mm, double row_mm, double greatest_mm)
+                           double layer_mm, double row_mm, double maximum_mm)
     : mesh_(sorted(mesh, walls, origin_mm, layer_mm, row_mm)),
       edges_(mesh_, features_),
-      greatest_mm_(greatest_mm) {
+      maximum_mm_(maximum_mm) {
   findNormals();
   findNeighbours();
   findOwned();
@@ -340,7 +340,7 @@ MeshFeature MeshFeatures::describeFace(std::uint32_t triangle) const {
   face.bounds = 3;
   face.distance[0] = formThrough(n, corner(triangle, 0));
   // The same for all distances, so that no voxel depends on the block in which it is made.
-  face.spread_mm = slack_mm + greatest_mm_ * double{bend_[triangle]};
+  face.spread_mm = slack_mm + maximum_mm_ * double{bend_[triangle]};
   for (int side = 0; side < 3; ++side) {
     const Vec3d& a = corner(triangle, side);
     Vec3d along = corner(triangle, (side + 1) % 3) - a;
@@ -448,10 +448,10 @@ MeshFeatures::Nearest MeshFeatures::nearest(Id id, const Vec3d& p) const {
   return {n * n.dot(p - corner(triangle, 0)), triangle};
 }
 
-Vec3d MeshFeatures::leastNormal(std::uint32_t triangle) const {
+Vec3d MeshFeatures::minimumNormal(std::uint32_t triangle) const {
   const Vec3d& normal = normals_[triangle];
-  Vec3d least = magnitudes(normal);
-  if (!hasFeatures(triangle)) return least;
+  Vec3d minimum = magnitudes(normal);
+  if (!hasFeatures(triangle)) return minimum;
   const Mesh::Triangle& corners = mesh_.triangles[triangle];
   for (std::uint32_t side = 0; side < 3; ++side) {
     if (corners[side] == corners[(side + 1) % 3]) continue;
@@ -463,10 +463,10 @@ Vec3d MeshFeatures::leastNormal(std::uint32_t triangle) const {
     const bool turned = mesh_.triangles[other / 3][other % 3] == corners[side];
     for (int axis = 0; axis < 3; ++axis) {
       const double across = turned ? -normals_[other / 3][axis] : normals_[other / 3][axis];
-      least[axis] = normal[axis] * across > 0 ? std::min(least[axis], std::abs(across)) : 0;
+      minimum[axis] = normal[axis] * across > 0 ? std::min(minimum[axis], std::abs(across)) : 0;
     }
   }
-  return least;
+  return minimum;
 }
 
 /// A triangle without area comes last, because it has no normal.

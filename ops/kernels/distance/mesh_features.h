@@ -79,9 +79,9 @@ class MeshFeatures {
 
   /// Keeps a sorted copy of `mesh` (mm), with positions relative to `origin_mm`. `layer_mm` and
   /// `row_mm` are the sizes of the bins along z and y that define the order. Distances above
-  /// `greatest_mm` are not needed. Triangles that `walls` hides have no features; their pieces do.
+  /// `maximum_mm` are not needed. Triangles that `walls` hides have no features; their pieces do.
   MeshFeatures(const Mesh& mesh, const SwallowedWalls& walls, const openvdb::Vec3d& origin_mm,
-               double layer_mm, double row_mm, double greatest_mm);
+               double layer_mm, double row_mm, double maximum_mm);
 
   [[nodiscard]] double memoryBytes() const;
 
@@ -155,7 +155,7 @@ class MeshFeatures {
 
   /// Returns by component the minimum magnitude of the normals of a triangle's face and of the
   /// wedges at its three edges.
-  [[nodiscard]] openvdb::Vec3d leastNormal(std::uint32_t triangle) const;
+  [[nodiscard]] openvdb::Vec3d minimumNormal(std::uint32_t triangle) const;
 
   /// Returns the index of a triangle in the mesh that was given.
   [[nodiscard]] std::uint32_t original(std::uint32_t triangle) const { return original_[triangle]; }
@@ -188,7 +188,7 @@ class MeshFeatures {
   std::vector<std::uint32_t> vertex_edges_;
   std::vector<std::uint32_t> side_edges_;  ///< by half-edge
   std::vector<std::uint8_t> owned_;        ///< by triangle: bits of its sides, then of its corners
-  double greatest_mm_;
+  double maximum_mm_;
   std::vector<float> bend_;     ///< by triangle: the maximum at its smooth edges and corners
   std::vector<Extent> blocks_;  ///< of every `block_size` triangles in order
 };

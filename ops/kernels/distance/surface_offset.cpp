@@ -87,14 +87,104 @@ FloatTree surfaceHeights(const SurfaceOffset& offset, const FloatTree& surface,
   return heights;
 }
 
+/// h where it is the same everywhere. This and the classes below return h for the voxels of one
+/// leaf after another.
+struct ConstantHeight {
+  double height_mm;
+  void visit(const FloatLeaf&) {}
+  double operator()(unsigned, float) const { return height_mm; }
+};
+
+/// h at the foot point of a voxel.
+struct HeightAtFoot {
+  LeafNormals normals;
+  const SurfaceOffset& offset;
+  std::shared_ptr<Heights> heights;
+  const FloatLeaf* leaf = nullptr;
+
+  void visit(const FloatLeaf& next) {
+    leaf = &next;
+    normals.visit(next, activeBits(next, 0xff));
+  }
+  double operator()(unsigned n, float d) {
+    const Vec3d normal(normals.normal(n));
+    if (normal == Vec3d(0.0)) return offset.constant_mm;
+    const Coord ijk = leaf->offsetToGlobalCoord(n);
+    const Vec3d steps = normal * double{-d} / offset.lattice.pitch_mm;
+    return heights->at(ijk + Coord::floor(steps + 0.5),
+                       offset.lattice.position(ijk) + steps * offset.lattice.pitch_mm);
+  }
+};
+
+/// h at the closest surface voxel.
+struct HeightAtClosest {
+  double constant_mm;
+  ClosestSurfaceVoxel closest;
+  bool any = false;
+
+  void visit(const FloatLeaf& leaf) { any = closest.visit(leaf.origin()); }
+  double operator()(unsigned n, float) {
+    const auto found = any ? closest(n) : std::nullopt;
+    return found ? double{found->value} : constant_mm;
+  }
+};
+
+/// Returns the leaves with d − h for their active voxels of `core`. `make_heights()` returns one of
+/// the classes above for one thread.
+template <typename MakeHeights>
+std::vector<LeafValues> displaced(const FloatTree& surface,
+                                  const std::vector<const FloatLeaf*>& sources, ZRange core,
+                                  const MakeHeights& make_heights) {
+  std::vector<LeafValues> leaves(sources.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {
+    const Accessor accessor(surface);
+    auto height = make_heights();
+    for (std::size_t n = range.begin(); n != range.end(); ++n) {
+      const Coord origin = sources[n]->origin();
+      leaves[n] = LeafValues::of(accessor, origin);
+      LeafBits active = leaves[n].active;
+      for (std::uint64_t& word : active) word &= everyRow(rowWithin(origin.z(), core));
+      height.visit(*sources[n]);
+      forEachBit(active, [&](unsigned offset) {
+        float& d = leaves[n].distance[offset];
+        d = static_cast<float>(double{d} - height(offset, d));
+      });
+    }
+  });
+  return leaves;
+}
+
+/// Gives the voxels that a displaced surface passes through the sign that the distances around them
+/// ask for.
+void settleTies(const FloatTree& surface, const std::vector<const FloatLeaf*>& sources, ZRange core,
+                ZRange valid, const Vec3d& pitch_mm, std::vector<LeafValues>& leaves) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {
+    LeafSurroundings around(surface, valid);
+    for (std::size_t n = range.begin(); n != range.end(); ++n) {
+      LeafBits ties{};
+      forEachBit(leaves[n].active, [&](unsigned offset) {
+        const bool tie = std::abs(leaves[n].distance[offset]) < moved_tie_mm;
+        ties[offset / 64] |= std::uint64_t{tie} << (offset % 64);
+      });
+      for (std::uint64_t& word : ties) word &= everyRow(rowWithin(sources[n]->origin().z(), core));
+      if (ties == no_bits) continue;
+      around.visit(*sources[n], ties);
+      forEachBit(ties, [&](unsigned offset) {
+        const int trend = trendOfTie(around.at(offset), pitch_mm);
+        leaves[n].distance[offset] = trend < 0 ? -tied_mm : tied_mm;
+      });
+    }
+  });
+}
+
 }  // namespace
 
-double SurfaceOffset::greatestMm() const {
+double SurfaceOffset::maximumMm() const {
   double minimum = constant_mm - grid_limit_mm;
   double maximum = constant_mm + grid_limit_mm;
   if (map) {
-    minimum += map->leastMm();
-    maximum += map->greatestMm();
+    minimum += map->minimumMm();
+    maximum += map->maximumMm();
   }
   return std::max(std::abs(minimum), std::abs(maximum));
 }
@@ -115,86 +205,28 @@ FloatGrid::Ptr SurfaceOffset::run(const FloatGrid& surface, const FloatGrid* hei
   std::vector<Coord> origins;
   origins.reserve(sources.size());
   for (const FloatLeaf* leaf : sources) origins.push_back(leaf->origin());
-  std::vector<LeafValues> leaves(sources.size());
   std::atomic<float> maximum = 0;
 
-  /// `make_reader()` returns, for one thread, a function from a leaf, an offset and d to h.
-  const auto displace = [&](const auto& make_reader) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {
-      const Accessor accessor(surface.tree());
-      auto reader = make_reader();
-      LeafSurroundings around(surface.tree(), valid);
-      for (std::size_t n = range.begin(); n != range.end(); ++n) {
-        leaves[n] = LeafValues::of(accessor, origins[n]);
-        const std::uint8_t within = rowWithin(origins[n].z(), core);
-        LeafBits active = leaves[n].active;
-        for (std::uint64_t& word : active) word &= everyRow(within);
-        reader.visit(*sources[n]);
-        LeafBits ties{};
-        forEachBit(active, [&](unsigned offset) {
-          float& d = leaves[n].distance[offset];
-          d = static_cast<float>(double{d} - reader(offset, d));
-          ties[offset / 64] |= std::uint64_t{std::abs(d) < moved_tie_mm} << (offset % 64);
-        });
-        if (varies() || ties == no_bits) continue;
-        around.visit(*sources[n], ties);
-        forEachBit(ties, [&](unsigned offset) {
-          const int trend = trendOfTie(around.at(offset), lattice.pitch_mm);
-          leaves[n].distance[offset] = trend < 0 ? -tied_mm : tied_mm;
-        });
-      }
-    });
-  };
-
+  std::vector<LeafValues> leaves;
   if (!varies()) {
-    struct Constant {
-      double height_mm;
-      void visit(const FloatLeaf&) {}
-      double operator()(unsigned, float) { return height_mm; }
-    };
-    displace([&] { return Constant{constant_mm}; });
+    leaves = displaced(surface.tree(), sources, core, [&] { return ConstantHeight{constant_mm}; });
+    settleTies(surface.tree(), sources, core, valid, lattice.pitch_mm, leaves);
   } else if (at == At::foot) {
-    struct AtFoot {
-      LeafNormals normals;
-      const SurfaceOffset& offset;
-      std::shared_ptr<Heights> heights;
-      const FloatLeaf* leaf = nullptr;
-      void visit(const FloatLeaf& next) {
-        leaf = &next;
-        normals.visit(next, activeBits(next, 0xff));
-      }
-      double operator()(unsigned n, float d) {
-        const Vec3d normal(normals.normal(n));
-        if (normal == Vec3d(0.0)) return offset.constant_mm;
-        const Coord ijk = leaf->offsetToGlobalCoord(n);
-        const Vec3d steps = normal * double{-d} / offset.lattice.pitch_mm;
-        return heights->at(ijk + Coord::floor(steps + 0.5),
-                           offset.lattice.position(ijk) + steps * offset.lattice.pitch_mm);
-      }
-    };
-    displace([&] {
-      return AtFoot{LeafNormals(surface.tree(), lattice.pitch_mm, valid), *this,
-                    std::make_shared<Heights>(*this, heights, maximum)};
+    leaves = displaced(surface.tree(), sources, core, [&] {
+      return HeightAtFoot{LeafNormals(surface.tree(), lattice.pitch_mm, valid), *this,
+                          std::make_shared<Heights>(*this, heights, maximum)};
     });
   } else {
     const SearchDisk disk(lattice.pitch_mm, searchRadiusMm());
     const FloatTree of_surface = surfaceHeights(
         *this, surface.tree(), heights, grownWithin(core, disk.halo().z(), valid), valid, maximum);
-    struct AtClosest {
-      double constant_mm;
-      ClosestSurfaceVoxel closest;
-      bool any = false;
-      void visit(const FloatLeaf& leaf) { any = closest.visit(leaf.origin()); }
-      double operator()(unsigned n, float) {
-        const auto found = any ? closest(n) : std::nullopt;
-        return found ? double{found->value} : constant_mm;
-      }
-    };
-    displace([&] { return AtClosest{constant_mm, ClosestSurfaceVoxel(of_surface, disk)}; });
+    leaves = displaced(surface.tree(), sources, core, [&] {
+      return HeightAtClosest{constant_mm, ClosestSurfaceVoxel(of_surface, disk)};
+    });
   }
   if (from_grid && !(double{maximum.load()} <= grid_limit_mm * (1 + 1e-6)))
-    throw DataError("the grid of offsets holds one of " + std::to_string(maximum.load()) +
-                    " mm, and --most is " + std::to_string(grid_limit_mm) + " mm");
+    throw DataError("the grid of offsets holds a value of " + std::to_string(maximum.load()) +
+                    " mm; --most allows " + std::to_string(grid_limit_mm) + " mm");
   return surfaceOf(surface, backgroundMm(), core, origins, leaves,
                    insideTiles(surface.tree(), core));
 }

@@ -32,9 +32,9 @@ struct SurfaceOffset {
   double held_mm = 0;  ///< the band of d
 
   /// The maximum |h|.
-  [[nodiscard]] double greatestMm() const;
+  [[nodiscard]] double maximumMm() const;
   /// The band of d′.
-  [[nodiscard]] float backgroundMm() const { return static_cast<float>(held_mm - greatestMm()); }
+  [[nodiscard]] float backgroundMm() const { return static_cast<float>(held_mm - maximumMm()); }
 
   struct Reach {
     int surface = 0;

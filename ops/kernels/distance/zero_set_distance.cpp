@@ -26,10 +26,10 @@ Band widened(const Band& band, const Vec3d& pitch_mm, double slack_mm) {
 
 /// What single precision leaves open of positions in such a box.
 double tieOf(const ZeroSet::Bounds& bounds) {
-  double greatest_mm = 0;
+  double maximum_mm = 0;
   for (int axis = 0; axis < 3; ++axis)
-    greatest_mm = std::max({greatest_mm, std::abs(bounds.min[axis]), std::abs(bounds.max[axis])});
-  return 0x1p-20 * greatest_mm;
+    maximum_mm = std::max({maximum_mm, std::abs(bounds.min[axis]), std::abs(bounds.max[axis])});
+  return 0x1p-20 * maximum_mm;
 }
 
 int chunkOf(int layer, int layers) { return (layer - (layer < 0 ? layers - 1 : 0)) / layers; }

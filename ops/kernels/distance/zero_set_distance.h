@@ -24,7 +24,7 @@ class ZeroSetDistance {
   /// fastest upwards.
   [[nodiscard]] openvdb::FloatGrid::Ptr run(ZRange core) const;
 
-  [[nodiscard]] double backgroundMm() const { return wide_.greatestMm(lattice_.pitch_mm); }
+  [[nodiscard]] double backgroundMm() const { return wide_.maximumMm(lattice_.pitch_mm); }
 
  private:
   /// A mesh is always made for this many layers at once, so that its bits depend on the chunk

@@ -22,9 +22,9 @@ inline float complemented(float d) { return d == 0 ? -tied_mm : -d; }
 /// Whether a centre on a surface with this outward normal counts as inside: where the point shifted
 /// by (ε, ε³, ε²) is. Components below a thousandth of the normal are rounding.
 inline bool tieIsInside(const openvdb::Vec3d& outward) {
-  const double least = 1e-3 * outward.length();
+  const double minimum = 1e-3 * outward.length();
   for (const int axis : {0, 2, 1})
-    if (std::abs(outward[axis]) > least) return outward[axis] < 0;
+    if (std::abs(outward[axis]) > minimum) return outward[axis] < 0;
   return false;
 }
 

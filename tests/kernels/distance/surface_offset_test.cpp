@@ -40,8 +40,8 @@ HeightMap bumps(int axis) {
 TEST(HeightMap, LiesInItsPlaneAndRepeats) {
   // Columns of x and rows of y: 1 2 3 over 4 5 6, the top first.
   const HeightMap map({1, 2, 3, 4, 5, 6}, 3, 2, 2, 2.0, {10, 20});
-  EXPECT_EQ(map.leastMm(), 1);
-  EXPECT_EQ(map.greatestMm(), 6);
+  EXPECT_EQ(map.minimumMm(), 1);
+  EXPECT_EQ(map.maximumMm(), 6);
   EXPECT_DOUBLE_EQ(map.at({11, 21, 77}), 4);
   EXPECT_DOUBLE_EQ(map.at({15, 21, 0}), 6);
   EXPECT_DOUBLE_EQ(map.at({11, 23, 0}), 1);
