@@ -7,7 +7,10 @@
 #include "ops/kernels/distance/leaf_distances.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <limits>
 
@@ -26,7 +29,6 @@ constexpr std::size_t leaves_per_page = 32;
 using Doubles = double __attribute__((vector_size(32), may_alias));
 using Floats = float __attribute__((vector_size(16), may_alias));
 using Integers = std::int32_t __attribute__((vector_size(16), may_alias));
-using Halves = std::int64_t __attribute__((vector_size(16), may_alias));
 using Row = float __attribute__((vector_size(32), may_alias, aligned(16)));
 using RowBits = std::int32_t __attribute__((vector_size(32), may_alias, aligned(16)));
 
@@ -126,10 +128,9 @@ struct FourColumns {
   Integers begin, end;
   Doubles inner_low, inner_high;
 
-  bool empty() const {
-    const Integers some = begin <= end;
-    const auto& halves = reinterpret_cast<const Halves&>(some);
-    return (halves[0] | halves[1]) == 0;
+  [[gnu::always_inline]] bool empty() const {
+    const auto some = std::bit_cast<std::array<std::int64_t, 2>>(begin <= end);
+    return (some[0] | some[1]) == 0;
   }
 };
 
