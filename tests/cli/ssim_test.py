@@ -89,7 +89,7 @@ class Ssim(ProgramTest):
         Image.new("RGBA", (20, 20)).save(self.folder / "nothing.png")
         self.refuse(1, "ssim: 'wide.png' has 50 x 30 pixels and 'a.png' 40 x 30; only pictures of one size can be compared",
                     "ssim", "a.png", "wide.png")
-        self.refuse(1, "'tiny.png' has 10 x 10 pixels; 11 x 11 is the least", "ssim", "tiny.png", "tiny.png")
+        self.refuse(1, "'tiny.png' has 10 x 10 pixels; the minimum is 11 x 11", "ssim", "tiny.png", "tiny.png")
         self.refuse(1, "'nothing.png' shows nothing: all of it is transparent", "ssim", "nothing.png", "nothing.png")
         self.refuse(1, "no such file 'none.png'", "ssim", "a.png", "none.png")
         self.refuse(2, "--pixel: '0' is not accepted; the length must be greater than 0 mm", "ssim", "a.png", "a.png", "--pixel", "0")
