@@ -35,7 +35,7 @@ struct FacetDither {
 /// For the measurements see docs/evaluation.md.
 ///
 /// Normals are divided into cells, and the choice for each is made when a normal first falls into
-/// it. At most 3000 waves are added up for a cell, on any lattice. Safe to use from many threads.
+/// it: about 2000 waves are added up at most, on any lattice. Safe to use from many threads.
 class AdaptedAmplitude {
  public:
   /// `spread_mm` is σ, the point spread of the process.
