@@ -6,6 +6,9 @@
 #include <cstdio>
 #include <cstring>
 #include <fcntl.h>
+#include <mutex>
+#include <set>
+#include <shared_mutex>
 #include <string>
 #include <sys/stat.h>
 #include <system_error>
@@ -39,6 +42,21 @@ std::string partialPrefix(const fs::path& target) {
                   "': " + std::generic_category().message(error));
 }
 
+/// The partial outputs of the process. Never destroyed, as a thread may end the process while
+/// another destroys what is static.
+struct Unfinished {
+  std::mutex mutex;
+  std::set<fs::path> paths;
+  /// Held by each change of an output that makes a new name: by writers shared, by the one who
+  /// abandons all outputs alone, for ever.
+  std::shared_timed_mutex naming;
+
+  static Unfinished& all() {
+    static auto* const unfinished = new Unfinished;
+    return *unfinished;
+  }
+};
+
 }  // namespace
 
 void StagedOutput::check(const fs::path& given, Kind kind, bool overwrite) {
@@ -70,12 +88,45 @@ void StagedOutput::check(const fs::path& given, Kind kind, bool overwrite) {
 StagedOutput::StagedOutput(const fs::path& target, Kind kind) : target_(named(target)) {
   partial_ = parentOf(target_) / (partialPrefix(target_) + std::to_string(::getpid()));
   removeLeftovers();
-  if (kind == Kind::folder && ::mkdir(partial_.c_str(), 0777) != 0) fail("make", target_, errno);
+  Unfinished& unfinished = Unfinished::all();
+  {
+    const std::lock_guard lock(unfinished.mutex);
+    unfinished.paths.insert(partial_);
+  }
+  const std::shared_lock naming(unfinished.naming);
+  if (kind == Kind::folder && ::mkdir(partial_.c_str(), 0777) != 0) {
+    const int error = errno;
+    forget();
+    fail("make", target_, error);
+  }
 }
 
 StagedOutput::~StagedOutput() {
   std::error_code ignored;
   if (!committed_) fs::remove_all(partial_, ignored);
+  forget();
+}
+
+void StagedOutput::forget() const {
+  const std::lock_guard lock(Unfinished::all().mutex);
+  Unfinished::all().paths.erase(partial_);
+}
+
+void StagedOutput::abandonAll(std::chrono::milliseconds patience) {
+  Unfinished& unfinished = Unfinished::all();
+  // Not to be unlocked again. A write to a dead network disk may hold it: then go on without.
+  (void)unfinished.naming.try_lock_for(patience);
+  std::set<fs::path> paths;
+  {
+    const std::lock_guard lock(unfinished.mutex);
+    paths = unfinished.paths;
+  }
+  for (const fs::path& path : paths) {
+    std::error_code ignored;
+    // Another thread may remove the same files, which ends an attempt early.
+    for (int attempt = 0; attempt < 10 && fs::exists(path, ignored); ++attempt)
+      fs::remove_all(path, ignored);
+  }
 }
 
 void StagedOutput::removeLeftovers() const {
@@ -86,13 +137,16 @@ void StagedOutput::removeLeftovers() const {
     if (!name.starts_with(prefix)) continue;
     pid_t owner = 0;
     const char* end = name.data() + name.size();
-    if (std::from_chars(name.data() + prefix.size(), end, owner).ptr != end || owner <= 0) continue;
+    const char* behind = std::from_chars(name.data() + prefix.size(), end, owner).ptr;
+    // What goes with a partial output has its name and a word, as in .NAME.partial-PID.old.
+    if (owner <= 0 || (behind != end && *behind != '.' && *behind != '-')) continue;
     if (owner == ::getpid() || (::kill(owner, 0) != 0 && errno == ESRCH))
       fs::remove_all(entry.path(), ignored);
   }
 }
 
 void StagedOutput::write(const fs::path& name, std::span<const std::uint8_t> bytes) const {
+  const std::shared_lock naming(Unfinished::all().naming);
   const fs::path path = partial_ / name;
   std::error_code error;
   if (name.has_parent_path()) fs::create_directories(path.parent_path(), error);
@@ -101,6 +155,7 @@ void StagedOutput::write(const fs::path& name, std::span<const std::uint8_t> byt
 }
 
 void StagedOutput::commit() {
+  const std::shared_lock naming(Unfinished::all().naming);
   // An exchange keeps a whole output in place all the time; where the file system has none, or
   // there is nothing to replace, the rename does.
   if (::renameat2(AT_FDCWD, partial_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) == 0) {

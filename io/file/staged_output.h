@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <span>
@@ -34,8 +35,15 @@ class StagedOutput {
   /// is there, whole.
   void commit();
 
+  /// Removes all outputs of the process that are not committed, and lets none be committed or
+  /// written to any more: threads that try stay where they are. For a process that ends without
+  /// its destructors.
+  /// \param patience  how long to wait for a write that is under way
+  static void abandonAll(std::chrono::milliseconds patience);
+
  private:
   void removeLeftovers() const;
+  void forget() const;
 
   std::filesystem::path target_;
   std::filesystem::path partial_;

@@ -138,17 +138,6 @@ class InTheWay(ProgramTest):
                 ("measure", "part.stl", "--reference", "part.stl", "--report", f"{place}/out.json"),
                 ("measure", "part.stl", "--reference", "part.stl", "--map", f"{place}/out.ply"))
 
-    def as_nobody(self):
-        """The keywords that run the program as a user without rights. Skips the test where only root may run the program."""
-        keywords = {"user": 65534, "group": 65534, "extra_groups": []}
-        try:
-            runs = self.run_program("--version", **keywords).returncode == 0
-        except PermissionError:
-            runs = False
-        if not runs:
-            self.skipTest("only root may run the program where it lies")
-        return keywords
-
     def test_a_read_only_folder_is_reported(self):
         place = self.folder / "locked"
         place.mkdir()

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <future>
+#include <system_error>
 
 #include <tbb/global_control.h>
 
 #include "vdbdither/engine/planning.h"
+#include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 
 namespace vdbdither {
@@ -86,11 +88,16 @@ void Pipeline::readInputsToEnd() {
   std::vector<std::future<void>> readers;
   for (Worker& worker : workers_) {
     if (worker.plan.inputs.empty()) continue;
-    readers.push_back(std::async(std::launch::async, [&worker] {
+    const auto read = [&worker] {
       worker.stage.monitor().timed([&] {
         for (Input* input : worker.stage.inputs()) input->readToEnd();
       });
-    }));
+    };
+    try {
+      readers.push_back(std::async(std::launch::async, read));
+    } catch (const std::system_error& error) {
+      throw DataError("cannot start a thread: " + error.code().message());
+    }
   }
   for (std::future<void>& reader : readers) reader.get();
 }

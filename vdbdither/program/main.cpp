@@ -21,6 +21,8 @@
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
 #include "vdbdither/program/console.h"
+#include "vdbdither/program/ending.h"
+#include "vdbdither/program/threads.h"
 
 namespace vdbdither {
 namespace {
@@ -117,6 +119,8 @@ void runReported(Job& job, Console& console, Clock::time_point start, const Func
 }
 
 void runTool(ToolRun&& tool) {
+  watchForInterrupts();
+  const GrantedThreads threads;
   const Clock::time_point start = Clock::now();
   Console console;
   console.begin(tool.options().quiet || tool.options().verbose, 0, 0);
@@ -128,6 +132,8 @@ void runChain(const std::vector<Step>& steps) {
   const RunOptions& options = pipeline.options();
   if (const OperatorInfo* info = pipeline.helpWanted())
     return printData(helpText(pageOf(*info)).c_str());
+  watchForInterrupts();
+  const GrantedThreads threads;
   const Clock::time_point start = Clock::now();
   Console console;
   console.begin(options.quiet, 0, 0);
@@ -173,6 +179,7 @@ bool namesItsVerb(const std::string& message) {
 
 int guardedMain(int argc, char** argv) {
   const auto fail = [](const char* message, int code) {
+    claimEnding(code);
     std::fprintf(stderr, "vdbdither%s %s\n", namesItsVerb(message) ? "" : ":", message);
     return code;
   };
@@ -180,13 +187,16 @@ int guardedMain(int argc, char** argv) {
   // system time.
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
   try {
+    openStandardDescriptors();
     setStandardOutputAside();
     noteInterrupts();
     initializeVdb();
     runProgram(argc, argv);
+    claimEnding(0);
     return 0;
   } catch (const Interrupted& error) {
-    fail(error.what(), 0);
+    claimEnding(128 + error.signal());
+    printLastLine(error.what());
     return 128 + error.signal();
   } catch (const UsageError& error) {
     return fail(error.what(), 2);
