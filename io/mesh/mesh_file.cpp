@@ -9,18 +9,24 @@
 
 namespace vdbdither {
 
-std::string_view MeshFile::text() const {
-  return bytes_.substr(bytes_.starts_with("\xEF\xBB\xBF") ? 3 : 0);
+namespace {
+
+std::string_view withoutMark(std::string_view text) {
+  return text.substr(text.starts_with("\xEF\xBB\xBF") ? 3 : 0);
 }
 
+}  // namespace
+
+std::string_view MeshFile::text() const { return withoutMark(bytes()); }
+
 std::string_view MeshFile::start() const {
-  TextCursor text(this->text());
+  TextCursor text(withoutMark(head()));
   text.skipSpace();
-  return {text.position(), bytes_.data() + bytes_.size()};
+  return {text.position(), head().data() + head().size()};
 }
 
 bool MeshFile::isText() const {
-  return bytes_.substr(0, 1024).find('\0') == std::string_view::npos;
+  return head().substr(0, 1024).find('\0') == std::string_view::npos;
 }
 
 bool MeshFile::isNamed(std::string_view ending) const {

@@ -49,11 +49,31 @@ TEST(Off, CutsPolygonsIntoTriangles) {
   EXPECT_EQ(cube.triangles[1], (Mesh::Triangle{0, 3, 2}));
 }
 
+const std::string tetrahedron =
+    "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+
+TEST(Off, ReadsByWordsWhereLinesAreNoElements) {
+  const Mesh mesh = parseQuietly("OFF\n4 4 6\n" + tetrahedron);
+  for (const char* text :
+       {"OFF 4 4 6 0 0 0 1 0 0 0 1 0 0 0 1 3 0 2 1 3 0 1 3 3 0 3 2 3 1 2 3",
+        "OFF\n4 4 6\n0 0 0 1 0 0\n0 1 0 0 0 1\n3 0 2 1\n3 0 1 3 # side\n3 0 3 2\n3 1 2 3\n",
+        "OFF\n4 4 6\n0\n0\n0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1 255 0 0\n3 0 1 3\n3 0 3 2\n3 1 2 3\n",
+        "NOFF\n4 4 6\n0 0 0 0 0 1 1 0 0 0 0 1 0 1 0 0 0 1 0 0 1\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 "
+        "2 3 1 2 3\n"}) {
+    SCOPED_TRACE(text);
+    expectSame(parseQuietly(text), mesh);
+  }
+}
+
 TEST(Off, WarnsOfWhatItPassesOver) {
   Warnings warnings;
-  expectTriangle(parse("OFF\n3 3 0\n" + corners + "2 0 1\n3 0 1 2\n0\n3 0 1 2\n", &warnings));
-  EXPECT_THAT(warnings, ElementsAre("'part': ignored 2 faces with fewer than 3 corners",
-                                    "'part': ignored 8 bytes after the last face"));
+  parse("OFF\n4 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n2 0 1\n0\n" + tetrahedron.substr(24) + "more\n",
+        &warnings);
+  EXPECT_THAT(warnings, ElementsAre("'part': ignored 5 bytes after the last face",
+                                    "'part': ignored 2 faces with fewer than 3 corners"));
+  EXPECT_EQ(refusal("OFF\n3 1 0\n" + corners + "3 0 1 2\n3 0 1 2\n"),
+            "'part', byte 36: 8 bytes follow the last face and the triangles before do not close: "
+            "the file is not as its header says; export it again");
 }
 
 TEST(Off, RefusesABadHeader) {
@@ -83,7 +103,8 @@ TEST(Off, RefusesABadBody) {
             "'part', line 4: vertex 2 must have three coordinates" + remedy);
   EXPECT_EQ(body("0 0 inf\n"), "'part', line 3: vertex 1 is not finite (0 0 inf)" + remedy);
   EXPECT_EQ(body("0 0 0\n"),
-            "'part', line 4: vertex 2 is missing: the file is cut off here" + remedy);
+            "'part', line 2: the header counts 3 vertices and 2 faces, more than the file holds: "
+            "it is cut off" + remedy);
   EXPECT_EQ(body(corners + "x\n"), "'part', line 6: face 1 must count its corners" + remedy);
   EXPECT_EQ(body(corners + "3 0 1\n2\n"),
             "'part', line 6: face 1 has fewer corners than it counts" + remedy);
@@ -97,9 +118,9 @@ TEST(Off, RefusesABadBody) {
 }
 
 TEST(Off, CountsOfBillionsAreRefusedAtOnce) {
-  EXPECT_THAT(refusal("OFF\n4294967294 1 0\n0 0 0\n"), HasSubstr("vertex 2 is missing"));
+  EXPECT_THAT(refusal("OFF\n4294967294 1 0\n0 0 0\n"), HasSubstr("more than the file holds"));
   EXPECT_THAT(refusal("OFF\n3 18446744073709551615 0\n" + corners + "3 0 1 2\n"),
-              HasSubstr("face 2 is missing"));
+              HasSubstr("more than the file holds"));
   EXPECT_THAT(refusal("OFF\n3 1 0\n" + corners + "18446744073709551615 0 1 2\n"),
               HasSubstr("face 1 has fewer corners than it counts"));
 }
