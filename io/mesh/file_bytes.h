@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <ctime>
-#include <memory>
 #include <string>
 #include <string_view>
 
@@ -29,14 +28,16 @@ class FileBytes {
 
  private:
   [[noreturn]] void refuse(const std::string& why) const;
+  [[noreturn]] void refuseSize() const;
   void open();
+  void close();
   void readUpTo(std::size_t end);
 
   std::string path_;
   int file_ = -1;
   std::size_t size_ = 0;
   timespec changed_{};
-  std::unique_ptr<char[]> bytes_;  // NOLINT(modernize-avoid-c-arrays): left uninitialized
+  char* bytes_ = nullptr;
   std::size_t read_ = 0;
 };
 

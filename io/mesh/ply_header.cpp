@@ -163,9 +163,12 @@ class HeaderParser {
   /// Whether a binary body that begins at `at` ends with the file.
   [[nodiscard]] bool fillsFile(std::size_t at) const;
 
-  void refuseCountsBeyondTheFile() {
+  /// Before the file is read. Of a short text the lines tell better what is wrong.
+  void refuseCountsBeyondTheFile() const {
+    const bool is_text = header_.encoding == PlyEncoding::kAscii;
+    if (is_text && file_.size() == file_.head().size()) return;
     std::uint64_t left = file_.size() - header_.body;
-    if (header_.encoding == PlyEncoding::kAscii) ++left;  // no blank follows the last number
+    if (is_text) ++left;  // no blank follows the last number
     for (const PlyElement& element : header_.elements) {
       const std::uint64_t least = element.leastBytes(header_.encoding);
       if (least == 0) continue;

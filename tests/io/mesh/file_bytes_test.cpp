@@ -1,7 +1,7 @@
 #include "io/mesh/file_bytes.h"
 
-#include <chrono>
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 
@@ -77,7 +77,9 @@ TEST(FileBytes, AFileLargerThanMemoryIsRefused) {
   const ScratchFolder folder;
   const auto path = folder.write("part.stl", "solid");
   std::filesystem::resize_file(path, std::uintmax_t{1} << 42);
-  EXPECT_THAT([&] { FileBytes(path.string()); },
+  FileBytes file(path.string());
+  EXPECT_EQ(file.head().substr(0, 6), std::string_view("solid\0", 6));
+  EXPECT_THAT([&] { file.all(); },
               ThrowsMessage<DataError>(HasSubstr("its 4398046511104 bytes do not fit into memory")));
 }
 

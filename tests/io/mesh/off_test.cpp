@@ -103,8 +103,7 @@ TEST(Off, RefusesABadBody) {
             "'part', line 4: vertex 2 must have three coordinates" + remedy);
   EXPECT_EQ(body("0 0 inf\n"), "'part', line 3: vertex 1 is not finite (0 0 inf)" + remedy);
   EXPECT_EQ(body("0 0 0\n"),
-            "'part', line 2: the header counts 3 vertices and 2 faces, more than the file holds: "
-            "it is cut off" + remedy);
+            "'part', line 4: vertex 2 is missing: the file is cut off here" + remedy);
   EXPECT_EQ(body(corners + "x\n"), "'part', line 6: face 1 must count its corners" + remedy);
   EXPECT_EQ(body(corners + "3 0 1\n2\n"),
             "'part', line 6: face 1 has fewer corners than it counts" + remedy);
@@ -118,9 +117,9 @@ TEST(Off, RefusesABadBody) {
 }
 
 TEST(Off, CountsOfBillionsAreRefusedAtOnce) {
-  EXPECT_THAT(refusal("OFF\n4294967294 1 0\n0 0 0\n"), HasSubstr("more than the file holds"));
+  EXPECT_THAT(refusal("OFF\n4294967294 1 0\n0 0 0\n"), HasSubstr("vertex 2 is missing"));
   EXPECT_THAT(refusal("OFF\n3 18446744073709551615 0\n" + corners + "3 0 1 2\n"),
-              HasSubstr("more than the file holds"));
+              HasSubstr("face 2 is missing"));
   EXPECT_THAT(refusal("OFF\n3 1 0\n" + corners + "18446744073709551615 0 1 2\n"),
               HasSubstr("face 1 has fewer corners than it counts"));
 }

@@ -147,7 +147,7 @@ TEST(Stl, BytesBehindAnOpenMeshMeanThatItWasMisread) {
     longer += bytes.substr(84 + 50 * i, 50) + "xy";
   EXPECT_THAT(refusal(longer, "part.stl"), HasSubstr("do not close"));
   EXPECT_THAT(refusal(bytes + std::string(50, 'x'), "part.stl"), HasSubstr("do not close"));
-  for (const std::string blank : {std::string("\r\n"), std::string(130, '\0'), std::string("\x1A")})
+  for (const std::string& blank : {std::string("\r\n"), std::string(130, '\0'), std::string("\x1A")})
     EXPECT_EQ(parse(bytes + blank, nullptr, "part.stl").triangles, open.triangles);
 }
 
@@ -245,7 +245,7 @@ TEST(Stl, RefusesAsciiThatIsNotAsItShouldBe) {
             "'part', line 4: cut off: the file ends within a facet; export or download it again");
   EXPECT_EQ(body(loop + corners + "vertex 1 1 0\nendloop\n"),
             "'part', line 8: a facet has 4 corners instead of 3; export triangles only");
-  EXPECT_EQ(body(loop + "vertex 0 0\n"),
+  EXPECT_EQ(body(loop + "vertex 0 0\nendloop\n"),
             "'part', line 4: a vertex is not three numbers; repair the line or export again");
   EXPECT_EQ(body(loop + "vertex 0 0,5 1\n"),
             "'part', line 4: a vertex is not three numbers; repair the line or export again");
