@@ -17,7 +17,10 @@ std::string_view withoutMark(std::string_view text) {
 
 }  // namespace
 
-std::string_view MeshFile::text() const { return withoutMark(bytes()); }
+std::string_view MeshFile::text() const {
+  const std::string_view text = withoutMark(bytes());
+  return text.substr(0, text.find_last_not_of(std::string_view("\x1A\0", 2)) + 1);
+}
 
 std::string_view MeshFile::start() const {
   TextCursor text(withoutMark(head()));

@@ -34,7 +34,8 @@ class MeshFile {
   [[nodiscard]] std::string_view bytes() const {
     return file_ != nullptr ? file_->all() : bytes_;
   }
-  /// All bytes without the byte order mark of UTF-8.
+  /// All bytes without the byte order mark of UTF-8 and without zeros and ^Z at the end, with which
+  /// some systems fill up a text.
   [[nodiscard]] std::string_view text() const;
   /// The head without a byte order mark and the white space at its beginning.
   [[nodiscard]] std::string_view start() const;

@@ -25,7 +25,7 @@ namespace {
 /// vertices have besides a position: texture coordinates, a colour, a normal, more coordinates.
 std::string_view offKeyword(std::string_view text) {
   std::size_t length = 0;
-  while (!text.substr(length).starts_with("OFF")) {
+  while (!equalsIgnoringCase(text.substr(length, 3), "off")) {
     const std::string_view rest = text.substr(length);
     if (rest.starts_with("ST")) {
       length += 2;
@@ -86,10 +86,12 @@ class OffReader {
     more_numbers_ = (has('S') ? 2 : 0) + (has('C') ? 4 : 0) + (has('N') ? 3 : 0);
     text_ = TextCursor(file_.start().substr(keyword.size()), TextCursor::Comments::hash);
     begin("the header", 0);
+    by_lines_ = false;
     const auto vertices = wholeNumber();
     const auto faces = wholeNumber();
+    by_lines_ = true;
     if (!vertices || !faces) refuse("must count vertices and faces; binary OFF is not read");
-    wholeNumber();  // edges
+    wholeNumber();  // the edges, which may be missing
     vertices_ = *vertices;
     faces_ = *faces;
     if (vertices_ > 0xFFFFFFFE) refuse("counts more than 4294967294 vertices");

@@ -42,7 +42,7 @@ class Body {
     if (index % elements_per_look == 0) throwIfInterrupted();
     element_ = &element;
     index_ = index;
-    if (encoding_ == PlyEncoding::kAscii) text_.skipSpace();
+    if (encoding_ == PlyEncoding::kAscii) skipRemarks(text_);
   }
 
   /// Ends with the element. Some writers put more on its line than the header declares.
@@ -114,7 +114,7 @@ class Body {
 
   /// What follows the last element.
   std::string_view rest() {
-    if (encoding_ == PlyEncoding::kAscii) text_.skipSpace();
+    if (encoding_ == PlyEncoding::kAscii) skipRemarks(text_);
     return {position(), end_};
   }
 
@@ -144,7 +144,18 @@ class Body {
   }
 
  private:
-  /// Whether the text has as many lines, without empty ones, as there are elements.
+  /// Goes to the next line that is neither empty nor a comment.
+  static void skipRemarks(TextCursor& text) {
+    for (;;) {
+      text.skipSpace();
+      TextCursor ahead = text;
+      const std::string_view word = ahead.word();
+      if (word != "comment" && word != "obj_info" && !word.starts_with('#')) return;
+      text.skipLine();
+    }
+  }
+
+  /// Whether the text has as many such lines as there are elements.
   [[nodiscard]] bool isByLines(const PlyHeader& header) const {
     if (encoding_ != PlyEncoding::kAscii) return false;
     std::uint64_t elements = 0;
@@ -152,7 +163,7 @@ class Body {
       if (!element.properties.empty()) elements += element.count;
     std::uint64_t lines = 0;
     TextCursor text({at_, end_});
-    for (text.skipSpace(); !text.atEnd() && lines <= elements; text.skipSpace()) {
+    for (skipRemarks(text); !text.atEnd() && lines <= elements; skipRemarks(text)) {
       text.skipLine();
       ++lines;
     }

@@ -22,7 +22,8 @@ void expectTriangle(const Mesh& mesh) {
 
 TEST(Off, UnderstandsEveryFormOfItsHeader) {
   for (const char* header :
-       {"OFF\n3 1 0\n", "OFF\r\n3 1 3\r\n", "OFF\r3 1\r", "OFF 3 1 0\n", "OFF3 1 0\n",
+       {"OFF\n3 1 0\n", "OFF\r\n3 1 3\r\n", "OFF\r3 1\r", "OFF 3 1 0\n", "OFF3 1 0\n", "off\n3 1\n",
+        "OFF\n3\n1\n",
         "\xEF\xBB\xBF\n OFF # by hand\n\n# counts\n 3\t1 0 # edges are not counted\n"}) {
     SCOPED_TRACE(header);
     expectTriangle(parseQuietly(header + corners + "3 0 1 2"));
@@ -80,7 +81,7 @@ TEST(Off, RefusesABadHeader) {
   const std::string remedy = "; export or download it again";
   EXPECT_EQ(refusal("OFF\n"),
             "'part', line 2: the header is missing: the file is cut off here" + remedy);
-  for (const char* counts : {"BINARY\n", "3\n1\n", "3 -1 0\n", "3 1.5 0\n"}) {
+  for (const char* counts : {"BINARY\n", "3\n", "3 -1 0\n", "3 1.5 0\n"}) {
     EXPECT_EQ(refusal(std::string("OFF ") + counts),
               "'part', line 1: the header must count vertices and faces; binary OFF is not read" +
                   remedy);

@@ -127,6 +127,13 @@ TEST(Ply, IgnoresWhatLinesHaveBehindTheirProperties) {
                                     "behind the properties that the header declares"));
 }
 
+TEST(Ply, CommentsMayStandInTheBody) {
+  for (const char* remark : {"comment 3 0 1 2", "obj_info x", "# faces"})
+    expectSame(parseQuietly(changed("\n(3 [^\n]*)", "\n" + std::string(remark) + "\n$1")),
+               floatPart());
+  expectSame(parseQuietly(plyFile(floatPart(), PlyEncoding::kAscii) + "comment end\n"), floatPart());
+}
+
 TEST(Ply, ReadsTextByWordsWhereLinesAreNoElements) {
   expectSame(parseQuietly(changed("\n3 ", "\n3\n")), floatPart());
   const std::string text = plyFile(floatPart(), PlyEncoding::kAscii);

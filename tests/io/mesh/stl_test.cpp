@@ -212,6 +212,7 @@ TEST(Stl, ReadsTextByWordsAndNotByLines) {
       {"a name like a keyword", with("solid part", "solid facet normal loop")},
       {"colours", with("(solid part|1?\\.0*e\\+00)\\n", "$1\n color 0.5 0.5 0.5\n")},
       {"remarks", with("\\n", " # a remark\n// another vertex\n; and one\ncomment more\n")},
+      {"filled up", text + std::string("\x1A\0\0", 3)},
       {"a remark in front", "# made by hand\n" + text},
       {"no solid", with("(end)?solid part\\n", "")},
       {"no loops", with(" +(outer loop|endloop)\\n", "")},
