@@ -18,8 +18,12 @@ std::string_view withoutMark(std::string_view text) {
 }  // namespace
 
 std::string_view MeshFile::text() const {
-  const std::string_view text = withoutMark(bytes());
-  return text.substr(0, text.find_last_not_of(std::string_view("\x1A\0", 2)) + 1);
+  std::string_view text = withoutMark(bytes());
+  while (!text.empty() && (text.back() == '\0' || text.back() == '\x1A')) text.remove_suffix(1);
+  const std::size_t zero = text.find('\0');
+  if (zero != std::string_view::npos)
+    refuseAtByte(text.data() + zero, "a zero, so this is no text; export it again");
+  return text;
 }
 
 std::string_view MeshFile::start() const {

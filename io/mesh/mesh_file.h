@@ -35,7 +35,7 @@ class MeshFile {
     return file_ != nullptr ? file_->all() : bytes_;
   }
   /// All bytes without the byte order mark of UTF-8 and without zeros and ^Z at the end, with which
-  /// some systems fill up a text.
+  /// some systems fill up a text. Refuses zeros elsewhere.
   [[nodiscard]] std::string_view text() const;
   /// The head without a byte order mark and the white space at its beginning.
   [[nodiscard]] std::string_view start() const;

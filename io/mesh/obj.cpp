@@ -97,10 +97,8 @@ class ObjReader {
       mesh_.vertices.push_back(parseVertex(file_, line, text_));
     } else if (isFace(statement)) {
       readFace(line);
-    } else if (!contains(immaterial, statement)) {
-      if (statement.find('\0') != std::string_view::npos)
-        file_.refuseAtLine(line, "holds zero bytes, so it is no text; export it again");
-      if (ignored_++ == 0) first_ignored_ = line;
+    } else if (!contains(immaterial, statement) && ignored_++ == 0) {
+      first_ignored_ = line;
     }
     // What is left of the line may be continued on the next.
     while (!text_.word().empty()) continue;

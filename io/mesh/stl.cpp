@@ -232,7 +232,7 @@ bool beginsRemark(std::string_view word) {
 class AsciiStlReader {
  public:
   explicit AsciiStlReader(const MeshFile& file)
-      : file_(file), welder_(file), text_(file.text()), at_(text_.position()) {}
+      : file_(file), welder_(file), all_(file.text()), text_(all_), at_(text_.position()) {}
 
   Mesh read() {
     while (const auto word = next()) readStatement(*word);
@@ -384,8 +384,7 @@ class AsciiStlReader {
       TextCursor facet = name;
       if (equalsIgnoringCase(word, "facet") && equalsIgnoringCase(facet.word(), "normal") &&
           facet.number()) {
-        text_ = TextCursor(file_.text().substr(
-            static_cast<std::size_t>(begin - file_.text().data())));
+        text_ = TextCursor(all_.substr(static_cast<std::size_t>(begin - all_.data())));
         return;
       }
     }
@@ -416,6 +415,7 @@ class AsciiStlReader {
 
   const MeshFile& file_;
   VertexWelder welder_;
+  std::string_view all_;
   TextCursor text_;
   const char* at_;  ///< where the statement begins
   std::array<Vec3d, 3> corners_;

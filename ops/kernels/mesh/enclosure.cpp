@@ -73,7 +73,7 @@ bool hasSeam(const Mesh& mesh) {
 }
 
 /// The share of `given` in the winding number of `mesh`, on average over points inside, which lie
-/// between points of the surface. 1 where hardly any point is inside.
+/// between points of the surface. Where hardly any point is inside, 1 or, without a volume, 0.
 double shareOf(const Mesh& given, const Mesh& mesh) {
   constexpr int maximum_tries = 20'000;
   constexpr int wanted = 500;
@@ -92,7 +92,9 @@ double shareOf(const Mesh& given, const Mesh& mesh) {
     sum += of_given.at(p) / all;
     ++inside;
   }
-  return inside < minimum ? 1 : sum / inside;
+  if (inside >= minimum) return sum / inside;
+  const double scale_mm = std::sqrt(areaOf(mesh));
+  return std::abs(volumeOf(mesh)) > 1e-6 * scale_mm * scale_mm * scale_mm ? 1 : 0;
 }
 
 }  // namespace

@@ -134,6 +134,18 @@ TEST(MeshReader, NamesFormatsThatAreNotReadYet) {
   EXPECT_EQ(refusal("Dear reader,\n", "a\nb"), "'a?b" + unknown);
 }
 
+TEST(MeshReader, ATextMayBeFilledUpWithZerosButHasNoneWithin) {
+  const Mesh mesh = floatPart();
+  for (const std::string& text : {asciiStl(mesh), objText(mesh)}) {
+    expectSame(parseQuietly(text + "\x1A"), mesh);
+    expectSame(parseQuietly(text + std::string(3000, '\0')), mesh);
+    const std::string begin = text + std::string(2000, '\n');
+    EXPECT_EQ(refusal(begin + std::string(3, '\0') + text),
+              "'part', byte " + std::to_string(begin.size()) +
+                  ": a zero, so this is no text; export it again");
+  }
+}
+
 TEST(MeshReader, RefusesFilesWithoutTriangles) {
   const std::string expected = "'part': holds no triangles; export a surface mesh";
   EXPECT_EQ(refusal(binaryStl({})), expected);

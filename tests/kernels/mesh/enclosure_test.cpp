@@ -91,10 +91,14 @@ std::string refusal(const Mesh& mesh) {
 }
 
 TEST(Enclosure, SurfacesThatBoundNothingAreRefused) {
+  const auto flat = [](double z) {
+    return sheet(9, 9, [z](double x, double y) { return Vec3d(x, y, z); });
+  };
   const std::map<std::string, Mesh> meshes{{"strip", moebiusStrip()},
                                            {"hoop", tube(0.3)},
                                            {"waves", waves()},
-                                           {"shallow cap", cap(0.3)}};
+                                           {"shallow cap", cap(0.3)},
+                                           {"two sheets", joined({flat(0), flat(1)})}};
   for (const auto& [name, mesh] : meshes) {
     SCOPED_TRACE(name);
     const std::string message = refusal(mesh);
