@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "ops/kernels/mesh/enclosure.h"
 #include "ops/kernels/mesh/winding_surface.h"
 #include "vdbdither/model/errors.h"
 
@@ -49,6 +50,12 @@ SolidMesh closed(DerivedMesh triangles, const SolidOptions& options) {
         std::move(given),
         {.open_sides = repairs.boundary_edges, .sides = 3 * (count - repairs.filling_triangles)},
         options);
+  }
+  if (options.guess) {
+    const Enclosure enclosure = enclosureOf(solid.mesh, repairs.filling_triangles);
+    if (!enclosure.boundsVolume())
+      throw DataError("the triangles bound no volume: " + enclosure.text(repairs.closed_holes) +
+                      "; close the surface or give it a thickness in a mesh editor first");
   }
   solid.report.repairs = repairs;
   return solid;
