@@ -59,6 +59,10 @@ class Walls {
   bool visitIntersecting(std::uint32_t triangle, const Visit& visit) const;
   [[nodiscard]] bool mayIntersect(std::uint32_t a, std::uint32_t b) const;
   [[nodiscard]] bool passes(std::uint32_t triangle, const Vec3d& from, const Vec3d& to) const;
+  /// Whether triangles lie in one plane as far as their direction tells.
+  [[nodiscard]] bool isParallel(std::uint32_t a, std::uint32_t b) const {
+    return planes_[a].normal.cross(planes_[b].normal).length() <= 1e-6;
+  }
   void addCuts(std::uint32_t triangle, std::uint32_t by, std::vector<WallCut>& cuts) const;
   [[nodiscard]] std::vector<char> findCrossed() const;
   [[nodiscard]] std::vector<std::uint32_t> largestOfPatches(TriangleGroups& patches) const;
@@ -71,7 +75,6 @@ class Walls {
   std::vector<BoxTree::Box> boxes_;
   BoxTree tree_;
   std::vector<char> crossed_;  ///< by triangle
-  int fall_at_side_ = 1;       ///< by how much the winding number may fall across a side
 };
 
 Walls::Walls(const Mesh& mesh)
@@ -86,8 +89,6 @@ Walls::Walls(const Mesh& mesh)
     for (std::size_t c = 0; c < 3; ++c) boxes_[t].expand(corner(t, c));
     boxes_[t].expand(in_plane_mm);  // flat ones in one plane overlap
   }
-  for (std::uint32_t e = 0; e < edges_.size(); ++e)
-    fall_at_side_ = std::max(fall_at_side_, static_cast<int>(edges_.halves(e).size()) - 1);
   std::vector<std::uint32_t> all(count_);
   std::iota(all.begin(), all.end(), 0U);
   tree_ = BoxTree(boxes_, std::move(all));
@@ -179,31 +180,34 @@ bool Walls::mayIntersect(std::uint32_t a, std::uint32_t b) const {
 /// plane.
 void Walls::addCuts(std::uint32_t triangle, std::uint32_t by, std::vector<WallCut>& cuts) const {
   const WallPlane& own = planes_[triangle];
-  const WallPlane& plane = planes_[by];
   std::array<double, 3> height;
   std::array<bool, 3> is_in;
+  double sum = 0;
   for (std::size_t c = 0; c < 3; ++c) {
     height[c] = own.at(corner(by, c));
     is_in[c] = std::abs(height[c]) <= in_plane_mm;
+    sum += height[c];
   }
-  const bool is_parallel = own.normal.cross(plane.normal).length() <= 1e-6;
+  const bool is_flat = isParallel(triangle, by) || (is_in[0] && is_in[1] && is_in[2]);
   std::array<Vec3d, 3> ends;
   std::size_t count = 0;
   for (std::size_t c = 0; c < 3; ++c) {
     const std::size_t next = (c + 1) % 3;
     const Vec3d& a = corner(by, c);
     const Vec3d& b = corner(by, next);
-    if (is_parallel || (is_in[c] && is_in[next])) {
+    if (is_flat) {
       Vec3d across = own.normal.cross(b - a);
       across.normalize();
-      cuts.push_back({a, b, {across, across.dot(a)}, fall_at_side_, fall_at_side_});
+      cuts.push_back({a, b, {across, across.dot(a)}});
+    } else if (is_in[c] && is_in[next]) {
+      cuts.push_back({a, b, planes_[by], sum > 0, sum < 0});
     } else if (is_in[c]) {
       ends[count++] = a;
     } else if (!is_in[next] && (height[c] > 0) != (height[next] > 0)) {
       ends[count++] = a + (b - a) * (height[c] / (height[c] - height[next]));
     }
   }
-  if (count == 2) cuts.push_back({ends[0], ends[1], plane, 0, 1});
+  if (count == 2) cuts.push_back({ends[0], ends[1], planes_[by], true, true});
 }
 
 /// Returns by triangle whether another may intersect it.
@@ -245,12 +249,15 @@ std::vector<Walls::Left> Walls::cutCrossed(const LineWinding& winding) const {
     if (crossed_[t] != 0) left.push_back({t});
   tbb::parallel_for(std::size_t{0}, left.size(), [&](std::size_t i) {
     const std::uint32_t t = left[i].triangle;
+    const Vec3d& normal = planes_[t].normal;
     std::vector<WallCut> cuts;
+    bool is_opposed = false;
     visitIntersecting(t, [&](std::uint32_t other) {
       addCuts(t, other, cuts);
+      is_opposed |= isParallel(t, other) && normal.dot(planes_[other].normal) < 0;
       return true;
     });
-    left[i].surface = WallCutter(winding, planes_[t].normal).cut(wholeOf(t), cuts, left[i].pieces);
+    left[i].surface = WallCutter(winding, normal, is_opposed).cut(wholeOf(t), cuts, left[i].pieces);
   });
   return left;
 }
@@ -269,7 +276,8 @@ SwallowedWalls Walls::find() {
   tbb::parallel_for(std::size_t{0}, largest.size(), [&](std::size_t i) {
     throwIfInterrupted();
     const std::uint32_t t = largest[i];
-    is_surface[i] = WallCutter(winding, planes_[t].normal).isSurface(middleOf(wholeOf(t))) ? 1 : 0;
+    is_surface[i] =
+        WallCutter(winding, planes_[t].normal, true).isSurface(middleOf(wholeOf(t))) ? 1 : 0;
   });
   for (std::size_t i = 0; i < largest.size(); ++i) surface[patches.of(largest[i])] = is_surface[i];
 

@@ -20,27 +20,29 @@ constexpr double beside_mm = 1e-5;
 using Cuts = std::vector<WallCut>;
 
 /// Returns what of a wall is above a plane and below it; nothing where the plane only touches it.
+/// Corners in the plane stay where they are, so that no piece has two at one place.
 std::optional<std::array<WallPiece, 2>> halvesOf(const WallPiece& wall, const WallPlane& plane) {
-  const auto beyond = [&](double side) {
-    return std::any_of(wall.begin(), wall.end(),
-                       [&](const Vec3d& p) { return side * plane.at(p) > in_plane_mm; });
+  const auto sideOf = [&](const Vec3d& p) {
+    const double height = plane.at(p);
+    return height > in_plane_mm ? 1 : height < -in_plane_mm ? -1 : 0;
   };
-  if (!beyond(1) || !beyond(-1)) return std::nullopt;
   std::array<WallPiece, 2> halves;
+  std::array<bool, 2> beyond{};
   for (std::size_t i = 0; i < wall.size(); ++i) {
     const Vec3d& p = wall[i];
     const Vec3d& q = wall[(i + 1) % wall.size()];
+    const int side = sideOf(p);
+    if (side >= 0) halves[0].push_back(p);
+    if (side <= 0) halves[1].push_back(p);
+    beyond[0] |= side > 0;
+    beyond[1] |= side < 0;
+    if (side * sideOf(q) >= 0) continue;
     const double at_p = plane.at(p);
-    const double at_q = plane.at(q);
-    if (at_p >= 0) halves[0].push_back(p);
-    if (at_p <= 0) halves[1].push_back(p);
-    if ((at_p > 0 && at_q < 0) || (at_p < 0 && at_q > 0)) {
-      const Vec3d between = p + (q - p) * (at_p / (at_p - at_q));
-      halves[0].push_back(between);
-      halves[1].push_back(between);
-    }
+    const Vec3d between = p + (q - p) * (at_p / (at_p - plane.at(q)));
+    halves[0].push_back(between);
+    halves[1].push_back(between);
   }
-  return halves;
+  return beyond[0] && beyond[1] ? std::optional(std::move(halves)) : std::nullopt;
 }
 
 /// Returns what of segments is above a plane and below it. Those in the plane are left out.
@@ -106,25 +108,39 @@ bool WallCutter::isSurface(const Vec3d& p) const {
   return (sides.front != 0) != (sides.back != 0);
 }
 
-/// On the straight way from the middle to any place of the wall each segment is passed at most
-/// once. So the number cannot fall to zero if it is above the sum of all that it may fall.
-bool WallCutter::isWithinSolid(const Vec3d& middle, const Cuts& cuts) const {
+/// Returns how much of a wall is surface where the number at its middle tells; otherwise leaves out
+/// the segments that cannot matter. On the straight way from the middle to any place each segment
+/// is passed at most once, so the number cannot fall by more than one at each segment that lies
+/// above the middle's side.
+std::optional<WallCutter::Surface> WallCutter::judge(const Vec3d& middle, Cuts& cuts) const {
   const LineWinding::Sides sides = winding_.at(middle, normal_, beside_mm);
-  int least = std::min(sides.front, sides.back);
+  int front = sides.front;
+  int back = sides.back;
+  bool front_changes = false;
   for (const WallCut& cut : cuts) {
-    if (least <= 0) return false;
-    const double height = cut.plane.at(middle);
-    least -= std::max(height < 2 * beside_mm ? cut.from_below : 0,
-                      height > -2 * beside_mm ? cut.from_above : 0);
+    const bool may_fall = cut.plane.at(middle) < 2 * beside_mm;
+    front -= cut.in_front && may_fall ? 1 : 0;
+    back -= cut.behind && may_fall ? 1 : 0;
+    front_changes |= cut.in_front;
   }
-  return least > 0;
+  if (front > 0 && back > 0) return Surface::none;
+  if (is_opposed_ || front < 0) return std::nullopt;
+  // The number behind is greater than that in front by the triangles in the plane.
+  if (front > 0) return Surface::none;
+  if (!front_changes) return Surface::all;
+  std::erase_if(cuts, [](const WallCut& cut) { return !cut.in_front; });
+  return std::nullopt;
 }
 
 WallCutter::Surface WallCutter::divide(const WallPiece& wall, Cuts cuts,
                                        std::vector<WallPiece>& pieces) const {
   throwIfInterrupted();
   const Vec3d middle = middleOf(wall);
-  if (cuts.size() > 1 && isWithinSolid(middle, cuts)) return Surface::none;
+  if (cuts.size() > 1) {
+    const std::optional<Surface> judged = judge(middle, cuts);
+    if (judged == Surface::all) pieces.push_back(wall);
+    if (judged) return *judged;
+  }
   std::optional<std::array<WallPiece, 2>> halves;
   WallPlane plane;
   if (const std::optional<WallPlane> between = planeBetween(cuts)) {

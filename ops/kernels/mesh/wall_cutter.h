@@ -26,9 +26,10 @@ using WallPiece = std::vector<openvdb::Vec3d>;
 /// A segment in the plane of a wall, on which another triangle meets it.
 struct WallCut {
   openvdb::Vec3d from, to;
-  WallPlane plane;     ///< that the segment lies in; cuts the wall there
-  int from_above = 0;  ///< by how much the winding number may fall across the segment, from above
-  int from_below = 0;  ///< the plane and from below it
+  WallPlane plane;  ///< that the segment lies in; cuts the wall there
+  /// Whether the winding number in front of the wall changes there, and behind it: it is less by
+  /// one above `plane`.
+  bool in_front = false, behind = false;
 };
 
 /// Cuts a triangle where others meet it, into pieces that are surface of the solid or not. The
@@ -38,9 +39,10 @@ class WallCutter {
   /// How much of a wall is surface.
   enum class Surface { none, some, all };
 
-  /// `normal` is the unit normal of the triangle. `winding` must outlive the cutter.
-  WallCutter(const LineWinding& winding, const openvdb::Vec3d& normal)
-      : winding_(winding), normal_(normal) {}
+  /// `normal` is the unit normal of the triangle; `is_opposed` tells whether triangles in its plane
+  /// may face the other way. `winding` must outlive the cutter.
+  WallCutter(const LineWinding& winding, const openvdb::Vec3d& normal, bool is_opposed)
+      : winding_(winding), normal_(normal), is_opposed_(is_opposed) {}
 
   /// Whether a place on the triangle is surface.
   [[nodiscard]] bool isSurface(const openvdb::Vec3d& p) const;
@@ -53,11 +55,12 @@ class WallCutter {
  private:
   Surface divide(const WallPiece& wall, std::vector<WallCut> cuts,
                  std::vector<WallPiece>& pieces) const;
-  [[nodiscard]] bool isWithinSolid(const openvdb::Vec3d& middle,
-                                   const std::vector<WallCut>& cuts) const;
+  [[nodiscard]] std::optional<Surface> judge(const openvdb::Vec3d& middle,
+                                             std::vector<WallCut>& cuts) const;
 
   const LineWinding& winding_;
   openvdb::Vec3d normal_;
+  bool is_opposed_;
 };
 
 /// Returns the mean of the corners.
