@@ -12,14 +12,12 @@
 #include <optional>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-
 #include "ops/kernels/mesh/box_tree.h"
 #include "ops/kernels/mesh/line_winding.h"
 #include "ops/kernels/mesh/mesh_edges.h"
+#include "ops/kernels/mesh/progress_part.h"
 #include "ops/kernels/mesh/triangle_groups.h"
 #include "ops/kernels/mesh/wall_cutter.h"
-#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 
@@ -213,8 +211,8 @@ void Walls::addCuts(std::uint32_t triangle, std::uint32_t by, std::vector<WallCu
 /// Returns by triangle whether another may intersect it.
 std::vector<char> Walls::findCrossed() const {
   std::vector<char> crossed(count_);
-  tbb::parallel_for(std::uint32_t{0}, count_, [&](std::uint32_t t) {
-    throwIfInterrupted();
+  forAll(count_, [&](std::size_t i) {
+    const auto t = static_cast<std::uint32_t>(i);
     crossed[t] = visitIntersecting(t, [](std::uint32_t) { return false; }) ? 0 : 1;
   });
   return crossed;
@@ -247,7 +245,7 @@ std::vector<Walls::Left> Walls::cutCrossed(const LineWinding& winding) const {
   std::vector<Left> left;
   for (std::uint32_t t = 0; t < count_; ++t)
     if (crossed_[t] != 0) left.push_back({t});
-  tbb::parallel_for(std::size_t{0}, left.size(), [&](std::size_t i) {
+  forAll(left.size(), [&](std::size_t i) {
     const std::uint32_t t = left[i].triangle;
     const Vec3d& normal = planes_[t].normal;
     std::vector<WallCut> cuts;
@@ -273,8 +271,7 @@ SwallowedWalls Walls::find() {
   const LineWinding winding(mesh_, edges_, boxes_);
   std::vector<char> surface(count_, 1);  // of patches, by their root
   std::vector<char> is_surface(largest.size());
-  tbb::parallel_for(std::size_t{0}, largest.size(), [&](std::size_t i) {
-    throwIfInterrupted();
+  forAll(largest.size(), [&](std::size_t i) {
     const std::uint32_t t = largest[i];
     is_surface[i] =
         WallCutter(winding, planes_[t].normal, true).isSurface(middleOf(wholeOf(t))) ? 1 : 0;

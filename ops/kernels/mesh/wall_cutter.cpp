@@ -1,8 +1,8 @@
 #include "ops/kernels/mesh/wall_cutter.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
-#include <iterator>
 #include <numeric>
 #include <utility>
 
