@@ -162,7 +162,7 @@ class Resample : public Source {
     return found->second;
   }
 
-  /// How the grid is to be read. Resolves what the options leave open.
+  /// Decides how the grid is read where the options leave it open.
   ZeroSet::Reading readingOf(const FloatGrid& grid) {
     if (kind_ == Kind::automatic) {
       const bool level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;

@@ -130,7 +130,7 @@ class SliceExport : public Sink {
     return static_cast<double>(format_->filesOfLayer(stack_.materials.size()));
   }
 
-  /// What the stack is known to be, but for its materials.
+  /// Plans everything about the stack except its materials.
   void planStack() {
     const auto metadata = [&](std::string_view key) {
       const auto entry = schema_.metadata.find(key);

@@ -127,7 +127,7 @@ class SliceImport : public Source {
     return leaves;
   }
 
-  /// Layers are asked for in whole leaves, so of a stack that does not end at one some are left.
+  /// Layers are requested in whole leaves: those behind the last whole leaf are checked here.
   void checkCovered(ZRange core) const {
     const ZRange stored = stack_->manifest().knownLayers();
     if (intersection(core, stored) == core || core.empty()) return;

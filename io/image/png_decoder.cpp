@@ -13,8 +13,8 @@ namespace vdbdither {
 
 namespace {
 
-/// Errors leave libpng as exceptions: it is told to, and its frames hold nothing to be freed that
-/// its structures do not own.
+/// Errors leave libpng as exceptions, thrown by its error callback. This is safe because the stack
+/// frames of libpng own nothing: its structures do.
 class Decoder {
  public:
   explicit Decoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {

@@ -17,7 +17,7 @@ struct ForeignFormat {
   std::string_view name;
 };
 
-/// What is met in the place of a mesh and can be named, told by its first bytes.
+/// Other kinds of files that can be recognized by their first bytes, for the message.
 constexpr std::array foreign_formats{
     ForeignFormat{"\xFF\xFE", "text in UTF-16"},
     ForeignFormat{"\xFE\xFF", "text in UTF-16"},

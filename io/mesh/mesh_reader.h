@@ -18,7 +18,7 @@ namespace vdbdither {
 /// file. Polygons come back as triangles that cover them, also when they are concave.
 ///
 /// @param path  a regular file; one that is written to while it is read is refused
-/// @param warn  told, one line each, of what was odd and yet read; may be empty
+/// @param warn  receives a line for each irregularity that was read anyway; may be empty
 /// @throws DataError for everything else: what is wrong, on which line or byte, and what to do
 Mesh readMesh(const std::filesystem::path& path,
               const std::function<void(const std::string&)>& warn);

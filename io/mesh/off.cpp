@@ -51,13 +51,11 @@ MeshMatch matchOff(const MeshFile& file) {
 class OffReader {
  public:
   explicit OffReader(const MeshFile& file)
-      : file_(file),
-        text_(file.start(), TextCursor::Comments::hash),
-        polygons_(file, mesh_) {}
+      : file_(file), text_(file.start(), TextCursor::Comments::hash), polygons_(file, mesh_) {}
 
   Mesh read() {
     readHeader();
-    // What the header says is no reason to allocate: a vertex takes six bytes of text.
+    // The count of a header alone must not decide how much is allocated: a vertex takes six bytes.
     mesh_.vertices.reserve(std::min(vertices_, bytesLeft() / 6 + 1));
     by_lines_ = hasLines(vertices_ + faces_);
     for (std::uint64_t i = 0; i < vertices_; ++i) {

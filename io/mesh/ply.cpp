@@ -82,7 +82,8 @@ class Body {
     return take<double, std::uint64_t>();
   }
 
-  /// The length of the list that follows; its items are known to fit into what is left of the file.
+  /// Reads the length of the list that follows. Throws unless the items fit into the rest of the
+  /// file.
   std::uint64_t nextCount(const PlyProperty& list) {
     const double count = next(*list.count_type);
     if (!(count >= 0) || count != std::floor(count)) {
@@ -129,8 +130,8 @@ class Body {
     return encoding_ == PlyEncoding::kAscii ? text_.position() : at_;
   }
 
-  /// How many of `element` there can be in the rest of the file: what a header says is no reason to
-  /// allocate.
+  /// Returns the maximum number of `element` in the rest of the file. The count of a header alone
+  /// must not decide how much memory is allocated.
   [[nodiscard]] std::uint64_t atMost(const PlyElement& element) const {
     return std::min(element.count,
                     left() / std::max<std::uint64_t>(element.leastBytes(encoding_), 1) + 1);
@@ -252,7 +253,7 @@ class BodyParser {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (axes[axis] < 0 || element.properties[static_cast<std::size_t>(axes[axis])].count_type) {
         file_.refuse(std::string("the vertices have no scalar property '") + "xyz"[axis] +
-                    "'; export it again");
+                     "'; export it again");
       }
     }
     if (element.count >= restart) file_.refuse("more than 4294967294 vertices; split the part");

@@ -99,7 +99,7 @@ class TextCursor {
     return endsLine(at) || isBlank(*at) || continuesLine(at) || beginsComment(at);
   }
   static bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
-  /// Most characters are told to be part of a word, and of a line, by one comparison.
+  /// One comparison classifies most characters as part of a word.
   static bool isPlain(char c) { return static_cast<signed char>(c) > '#' && c != '\\'; }
   void skipLineEnd() {
     if (at_ != end_ && *at_ == '\r') {

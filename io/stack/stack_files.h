@@ -41,7 +41,7 @@ class StackInput {
   /// `path`: a stack's folder, its manifest, or its zip archive. Throws DataError.
   explicit StackInput(const std::filesystem::path& path);
 
-  /// How the user knows the file called `name`.
+  /// The path of the file called `name`, for messages.
   [[nodiscard]] std::string shown(const std::string& name) const;
   [[nodiscard]] bool contains(const std::string& name) const;
   /// Safe to call from many threads. Throws DataError.

@@ -70,7 +70,7 @@ const Manifest::Slice* StackReader::find(int z, const std::string& material) con
   return slice == slices_.end() ? nullptr : slice->second;
 }
 
-/// The manifest tells of every slice, and they are there.
+/// Checks that the manifest lists every slice and that each file exists.
 void StackReader::checkFiles() const {
   for (int z = manifest_.layers.begin; z < manifest_.layers.end; ++z) {
     for (const std::string& material : filesOfLayer()) {

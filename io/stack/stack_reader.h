@@ -16,9 +16,9 @@ namespace vdbdither {
 class StackReader {
  public:
   /// @param path  the stack's folder, its manifest, or its zip archive
-  /// @param warn  called once where slices are not as their manifest describes them, from any
-  /// thread
-  /// Throws DataError where there is no stack, and where its slices are not all there.
+  /// @param warn  called at most once, from any thread, if slices are not as their manifest
+  /// describes them
+  /// Throws DataError if there is no stack or a slice is missing.
   StackReader(const std::filesystem::path& path, std::function<void(const std::string&)> warn);
 
   [[nodiscard]] const Manifest& manifest() const { return manifest_; }

@@ -22,7 +22,7 @@ class ZipWriter {
   /// `name` is in UTF-8, with `/` between folders.
   void add(const std::string& name, std::span<const std::uint8_t> bytes);
 
-  /// Writes the directory at the end, without which it is no archive.
+  /// Writes the directory at the end of the archive. An archive without it cannot be read.
   void finish();
 
  private:
@@ -35,7 +35,7 @@ class ZipWriter {
 /// Reads files of a zip archive by name. Safe to use from many threads.
 class ZipReader {
  public:
-  /// Throws DataError for what is no zip archive.
+  /// Throws DataError if the file is not a zip archive.
   explicit ZipReader(const std::filesystem::path& path);
   ZipReader(const ZipReader&) = delete;
   ZipReader& operator=(const ZipReader&) = delete;

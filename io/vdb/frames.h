@@ -31,7 +31,7 @@ class FrameWriter {
 /// layers.
 class FrameReader {
  public:
-  /// `where` names the pipe in messages. Throws DataError for anything that is no VDB stream.
+  /// `where` names the pipe in messages. Throws DataError for anything that is not a VDB stream.
   FrameReader(int descriptor, const std::string& where);
 
   [[nodiscard]] const Schema& schema() const { return schema_; }

@@ -14,9 +14,9 @@ namespace vdbdither {
 
 namespace {
 
-/// `slab`, one of the layers `incoming`, for a filter that wants the layers `window`: at both ends
-/// of `incoming` it takes the empty layers of its outermost leaves along, so that the next slab
-/// begins with a leaf.
+/// Returns `slab` for a filter that reads the layers `window`. At both ends of `incoming`, the
+/// layers of the job, the core is widened to whole leaves, so that the next slab begins with a
+/// leaf. The added layers are empty.
 Slab widened(Slab slab, ZRange incoming, ZRange window) {
   const ZRange core = slab.core;
   if (core.begin == incoming.begin) slab.core.begin = alignedToLeaves(core).begin;

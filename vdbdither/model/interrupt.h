@@ -6,7 +6,7 @@
 
 namespace vdbdither {
 
-/// The user or the system asked the run to stop. Destructors take away what was half made.
+/// The user or the system stopped the run. Destructors remove unfinished output.
 class Interrupted : public Error {
  public:
   explicit Interrupted(int signal_number);

@@ -36,7 +36,7 @@ std::string helpOn(const std::string& verb) {
   return helpText(pageOf(findOperator(verb)));
 }
 
-/// Refuses a word that is no operator but close to the name of a tool.
+/// Refuses a word that is not an operator but resembles the name of a tool.
 void refuseNearTool(const std::string& word) {
   std::vector<std::string> names;
   for (const OperatorInfo* info : registeredOperators()) names.emplace_back(info->name);
