@@ -9,6 +9,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "vdbdither/model/words.h"
+
 namespace vdbdither {
 
 /// Walks through a text by lines, words and numbers. "\n", "\r" and "\r\n" end a line; a backslash
@@ -164,15 +166,5 @@ class TextCursor {
   const char* end_;
   bool has_comments_;
 };
-
-/// Whether two ASCII words are equal but for upper and lower case; `lower` is lower case.
-inline bool equalsIgnoringCase(std::string_view word, std::string_view lower) {
-  if (word.size() != lower.size()) return false;
-  for (std::size_t i = 0; i < word.size(); ++i) {
-    const char c = word[i];
-    if ((c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c) != lower[i]) return false;
-  }
-  return true;
-}
 
 }  // namespace vdbdither

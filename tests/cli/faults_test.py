@@ -48,7 +48,7 @@ class FullDisk(ProgramTest):
             old.write_bytes(b"old")
         else:
             old.mkdir()
-            (old / "manifest.json").write_bytes(b"old")
+            (old / "manifest.json").write_bytes(b'{"slices": []}')
         before = self.listing()
         filled = 0
         for size in sizes:
@@ -151,6 +151,18 @@ class InTheWay(ProgramTest):
         for arguments in self.sinks("locked"):
             self.refuse(1, "Permission denied", *arguments, **keywords)
 
+    def test_a_read_only_stack_is_not_replaced(self):
+        self.succeed("slice-export", "-i", "part.vdb", "out")
+        (self.folder / "out").chmod(0o555)
+        self.addCleanup((self.folder / "out").chmod, 0o755)
+        keywords = {}
+        if os.geteuid() == 0:
+            self.folder.chmod(0o777)
+            (self.folder / "part.vdb").chmod(0o644)
+            keywords = self.as_nobody()
+        self.refuse(1, "slice-export: cannot replace 'out': Permission denied", "slice-export", "-i", "part.vdb", "out", "--overwrite",
+                    **keywords)
+
     def test_an_unreadable_file_is_reported(self):
         keywords = {}
         for name in ("part.stl", "part.vdb"):
@@ -227,7 +239,7 @@ class Killed(ProgramTest):
                 process.wait()
                 left = self.hidden()
                 self.assertEqual(len(left), 1)
-                self.assertTrue(re.fullmatch(rf"\.{target}\.partial-{process.pid}", left[0]), left)
+                self.assertTrue(re.fullmatch(rf"\.{target}\.partial-[0-9a-f]{{8}}-{process.pid}", left[0]), left)
                 hidden = tuple(left)
                 self.assertEqual([entry for entry in self.listing() if not entry[0].startswith(hidden)], before)
                 self.succeed(*small)
