@@ -8,7 +8,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -62,20 +64,31 @@ std::string toJson(const MaterialTable& table) {
   for (std::size_t i = 0; i < table.size(); ++i) {
     json.push_back({{"index", i + 1}, {"name", table[i].name}, {"rgba", table[i].rgba}});
   }
-  return json.dump();
+  return jsonText(json);
 }
 
 MaterialTable materialTableFromJson(const std::string& text) {
   try {
     MaterialTable table;
     for (const ordered_json& entry : ordered_json::parse(text)) {
-      if (entry.at("index") != table.size() + 1) throw DataError("indices must be 1, 2, 3, …");
-      table.push_back({entry.at("name"), entry.at("rgba")});
+      if (entry.at("index") != table.size() + 1) {
+        throw DataError("the metadata " + std::string(materials_key) +
+                        " is not a table of materials: its indices must be 1, 2, 3 and so on");
+      }
+      const std::string name = printable(entry.at("name").get<std::string>());
+      // Slices of one material lie in a folder of its name.
+      if (name.empty() || name.starts_with('.') || name.find('/') != std::string::npos) {
+        throw DataError("the metadata " + std::string(materials_key) +
+                        " is not a table of materials: '" + name +
+                        "' cannot be the name of a folder; assign the materials again");
+      }
+      table.push_back({name, entry.at("rgba")});
     }
     return table;
-  } catch (const std::exception& error) {
-    throw DataError("metadata " + std::string(materials_key) +
-                    " is not a table of materials: " + error.what());
+  } catch (const ordered_json::exception&) {
+    throw DataError("the metadata " + std::string(materials_key) +
+                    " is not a table of materials: it must be a JSON list of objects with index, "
+                    "name and rgba (four whole numbers); assign the materials again");
   }
 }
 

@@ -8,8 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file/data_files.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/options.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -57,7 +59,7 @@ class ProfileParser {
   }
 
   std::string text(const ordered_json& json, const char* key, const std::string& where) {
-    if (json.contains(key) && json[key].is_string()) return json[key];
+    if (json.contains(key) && json[key].is_string()) return printable(json[key].get<std::string>());
     if (json.contains(key)) problems_.push_back(where + key + " is no text");
     return "";
   }
@@ -176,7 +178,7 @@ std::string toJson(const PrinterProfile& profile) {
   for (const Material& material : profile.materials) {
     json["materials"].push_back({{"name", material.name}, {"rgba", material.rgba}});
   }
-  return json.dump();
+  return jsonText(json);
 }
 
 PrinterProfile printerProfileFromJson(const std::string& text) {

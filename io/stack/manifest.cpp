@@ -2,8 +2,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/version.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -41,8 +43,9 @@ Manifest manifestOf(const ordered_json& json) {
   }
   manifest.background = json.at("background");
   for (const ordered_json& entry : json.at("materials"))
-    manifest.materials.push_back({entry.at("name"), entry.at("rgba")});
-  if (!json.at("printer").is_null()) manifest.printer = json["printer"].dump();
+    manifest.materials.push_back(
+        {printable(entry.at("name").get<std::string>()), entry.at("rgba")});
+  if (!json.at("printer").is_null()) manifest.printer = jsonText(json["printer"]);
   for (const ordered_json& line : json.at("history"))
     manifest.history.push_back(line.get<std::string>());
   for (const ordered_json& entry : json.at("slices")) {
@@ -90,7 +93,7 @@ std::string textOf(const Manifest& manifest) {
     if (!slice.material.empty()) entry["material"] = slice.material;
     json["slices"].push_back(std::move(entry));
   }
-  return json.dump(1) + "\n";
+  return jsonText(json, 1) + "\n";
 }
 
 Manifest readManifest(const StackInput& stack) {
@@ -99,8 +102,14 @@ Manifest readManifest(const StackInput& stack) {
   Manifest manifest;
   try {
     manifest = manifestOf(ordered_json::parse(bytes.begin(), bytes.end()));
-  } catch (const ordered_json::exception& error) {
-    throw DataError(shown + " is not a manifest of slice-export: " + error.what());
+  } catch (const ordered_json::parse_error& error) {
+    throw DataError(shown + " is not a manifest of slice-export: it is no JSON from byte " +
+                    std::to_string(error.byte) + " on" + make_stack_again);
+  } catch (const ordered_json::exception&) {
+    throw DataError(shown +
+                    " is not a manifest of slice-export: a key is missing, or its value is "
+                    "of another type" +
+                    make_stack_again);
   }
   const Lattice& lattice = manifest.lattice;
   for (int axis = 0; axis < 3; ++axis) {

@@ -12,6 +12,7 @@
 #include "io/file/standard_streams.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/chain.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/manual.h"
 #include "vdbdither/engine/named_file.h"
 #include "vdbdither/engine/pipeline.h"
@@ -20,6 +21,8 @@
 #include "vdbdither/engine/version.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
+#include "vdbdither/model/printable.h"
+#include "vdbdither/model/unexpected.h"
 #include "vdbdither/program/console.h"
 
 namespace vdbdither {
@@ -83,7 +86,7 @@ std::string reportJson(const JobReport& report, double seconds) {
     for (const auto& [name, value] : stage.counts) entry["counts"][name] = value;
     json["stages"].push_back(entry);
   }
-  return json.dump() + "\n";
+  return jsonText(json) + "\n";
 }
 
 void printStages(const JobReport& report, double seconds) {
@@ -172,8 +175,9 @@ bool namesItsVerb(const std::string& message) {
 }
 
 int guardedMain(int argc, char** argv) {
-  const auto fail = [](const char* message, int code) {
-    std::fprintf(stderr, "vdbdither%s %s\n", namesItsVerb(message) ? "" : ":", message);
+  const auto fail = [](const std::string& message, int code) {
+    std::fprintf(stderr, "vdbdither%s %s\n", namesItsVerb(message) ? "" : ":",
+                 printable(message).c_str());
     return code;
   };
   // The next slab needs what one slab frees: returning it to the system in between doubles the
@@ -192,8 +196,10 @@ int guardedMain(int argc, char** argv) {
     return fail(error.what(), 2);
   } catch (const std::bad_alloc&) {
     return fail("out of memory; try a smaller --slab or fewer --layers", 1);
-  } catch (const std::exception& error) {
+  } catch (const Error& error) {
     return fail(error.what(), 1);
+  } catch (const std::exception& error) {
+    return fail(unexpectedText(error), 1);
   }
 }
 
