@@ -175,7 +175,7 @@ class Description {
     for (const auto& [name, summary] : summaries_) {
       all["grids"].push_back(gridJson(name, *schema_.grids.at(name), summary));
     }
-    const ordered_json printer = ordered_json::parse(metadata(printer_key), nullptr, false);
+    const ordered_json printer = parsedJson(metadata(printer_key));
     if (!printer.is_discarded()) all["printer"] = printer;
     all["history"] = history();
     return jsonText(all) + "\n";

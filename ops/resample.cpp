@@ -162,6 +162,7 @@ class Resample : public Source {
         history != contents.metadata.end()) {
       schema.metadata.insert(*history);
     }
+    const bool is_asked = !grid_name_.empty();
     const GridConstPtr grid = chosen(contents.grids);
     if (!isOfNumbers(*grid) && !isOfVoxels(*grid))
       throw DataError("grid '" + grid_name_ + "' is of " + grid->valueType() +
@@ -170,21 +171,22 @@ class Resample : public Source {
       throw DataError("grid '" + grid_name_ +
                       "' lies in a frustum; only affine transforms will do");
     checked(Grids::value_type(grid_name_, grid), where);
-    tellUnused(contents.grids);
+    tellUnused(contents.grids, is_asked);
     is_voxels_ = isOfVoxels(*grid);
     voxel_mm_ = picoGkVoxelMm(*grid);
     return withInside(asFloats(grid));
   }
 
-  /// Names the grids that are left out, which may be parts of the same thing.
-  void tellUnused(const Grids& grids) const {
+  /// Names the grids that are left out, which may be parts of the same thing, unless the user chose
+  /// among them.
+  void tellUnused(const Grids& grids, bool is_asked) const {
     std::string others;
     for (const auto& [name, grid] : grids) {
       if (name == grid_name_) continue;
       others += (others.empty() ? "'" : ", '") + name + "' (" + grid->valueType() + ")";
     }
-    if (others.empty()) return;
     const bool has_namesake = grids.contains(grid_name_ + "_2");
+    if (others.empty() || (is_asked && !has_namesake)) return;
     report().warn("only grid '" + grid_name_ + "' is used, not " + others +
                   (has_namesake ? "; '" + grid_name_ +
                                       "_2' is a second grid of that name; csg "
@@ -305,7 +307,11 @@ class Resample : public Source {
     auto surface = made(map);
     if (surface->cells() == 0)
       throw DataError("grid '" + grid_name_ + "' has no surface: none of its values pass " +
-                      shortestText(double{reading.level}) + "; check --kind and --level");
+                      shortestText(double{reading.level}) +
+                      (reading.above ? " (the greatest is " +
+                                           rounded(amountOf(*grid, reading.level).greatest) + ")"
+                                     : "") +
+                      "; check --kind and --level");
     questionFog(*grid, reading, std::abs(map.det()), surface->cells() * division_mm2_ / 1.5);
     if (!placement_.on_bed) return surface;
     map.postTranslate(bedCornerMm({pitch_mm, Vec3d(0.0), {}}) - surface->bounds().min);

@@ -23,7 +23,7 @@ namespace {
 class ProfileParser {
  public:
   explicit ProfileParser(const std::string& text) {
-    const ordered_json json = ordered_json::parse(text, nullptr, false);
+    const ordered_json json = parsedJson(text);
     if (!json.is_object()) {
       problems_.emplace_back("the text is no JSON object");
       return;

@@ -62,7 +62,7 @@ std::string textOf(const Manifest& manifest) {
   const Lattice& lattice = manifest.lattice;
   ordered_json json;
   json["creator"] = std::string("vdbdither ") + version;
-  const ordered_json printer = ordered_json::parse(manifest.printer, nullptr, false);
+  const ordered_json printer = parsedJson(manifest.printer);
   json["printer"] = printer.is_discarded() ? ordered_json() : printer;
   json["format"] = manifest.format;
   json["grid"] = manifest.grid;
@@ -100,15 +100,13 @@ Manifest readManifest(const StackInput& stack) {
   const std::vector<std::uint8_t> bytes = stack.read(manifest_name);
   const std::string shown = "'" + stack.shown(manifest_name) + "'";
   Manifest manifest;
+  const ordered_json json = parsedJson({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const std::string refused = shown + " is not a manifest of slice-export: ";
+  if (json.is_discarded()) throw DataError(refused + "it is no JSON" + make_stack_again);
   try {
-    manifest = manifestOf(ordered_json::parse(bytes.begin(), bytes.end()));
-  } catch (const ordered_json::parse_error& error) {
-    throw DataError(shown + " is not a manifest of slice-export: it is no JSON from byte " +
-                    std::to_string(error.byte) + " on" + make_stack_again);
+    manifest = manifestOf(json);
   } catch (const ordered_json::exception&) {
-    throw DataError(shown +
-                    " is not a manifest of slice-export: a key is missing, or its value is "
-                    "of another type" +
+    throw DataError(refused + "a key is missing, or its value is of another type" +
                     make_stack_again);
   }
   const Lattice& lattice = manifest.lattice;

@@ -22,11 +22,8 @@ namespace vdbdither {
 
 namespace {
 
-constexpr const char* frame_key = "vdbdither:frame";
-/// Of every frame but the head: the id of the run, which is the UUID of its head frame. The same
-/// run gives the same bytes, so the id is a digest and not a random number.
-constexpr const char* run_key = "vdbdither:run";
-
+/// The id of a run is the UUID of its head frame: the same run gives the same bytes, so that it is
+/// a digest and not a random number.
 std::string uuidOf(std::string_view archive) {
   return std::string(archive.substr(uuid_offset, uuid_size));
 }

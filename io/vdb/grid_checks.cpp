@@ -11,6 +11,7 @@
 #include <tbb/parallel_reduce.h>
 
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
@@ -82,6 +83,12 @@ std::optional<std::string> notFiniteOf(const TreeT& tree) {
   return std::nullopt;
 }
 
+/// Level sets, and `surface` of a tool that leaves the class open.
+bool holdsDistances(const openvdb::GridBase& grid) {
+  return grid.getGridClass() == openvdb::GRID_LEVEL_SET ||
+         (grid.getGridClass() == openvdb::GRID_UNKNOWN && grid.getName() == surface_grid);
+}
+
 }  // namespace
 
 bool isCountable(const Coord& index) {
@@ -100,8 +107,8 @@ std::optional<std::string> faultOf(const openvdb::GridBase& grid) {
         openvdb::VecTraits<ValueT>::IsVec || std::is_floating_point_v<ValueT>;
     if constexpr (has_fractions) fault = notFiniteOf(typed.tree());
     if constexpr (std::is_floating_point_v<ValueT>) {
-      if (!fault && typed.getGridClass() == openvdb::GRID_LEVEL_SET && typed.background() < 0) {
-        fault = "is a level set with the background " + textOf(typed.background()) +
+      if (!fault && holdsDistances(typed) && typed.background() < 0) {
+        fault = "holds distances with the background " + textOf(typed.background()) +
                 ", so that everything beyond its voxels is inside" + mend;
       }
     }

@@ -11,8 +11,8 @@ namespace vdbdither {
 bool isCountable(const openvdb::Coord& index);
 
 /// Returns what no operator can work with in a grid, with the first voxel that has it and what to
-/// do, or nothing for a sound grid: a value that is not a finite number, or a level set that is
-/// inside everywhere beyond its voxels.
+/// do, or nothing for a sound grid: a value that is not a finite number, or distances that are
+/// inside everywhere beyond their voxels.
 std::optional<std::string> faultOf(const openvdb::GridBase& grid);
 
 /// Throws DataError that begins with `where` and names the grid, if the grid has a fault. Grids

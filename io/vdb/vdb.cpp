@@ -186,6 +186,17 @@ CoordBBox parseBox(const std::string& text, const std::string& where) {
   return box;
 }
 
+/// Refuses a box that is taller than any print: the run would take days to find nothing.
+void checkLayers(const Lattice& lattice, const std::string& where) {
+  constexpr std::int64_t most = 10'000'000;
+  const std::int64_t layers =
+      lattice.box.empty() ? 0 : std::int64_t{lattice.box.max().z()} - lattice.box.min().z() + 1;
+  if (layers > most) {
+    throw DataError(where + " has " + std::to_string(layers) + " layers, and at most " +
+                    std::to_string(most) + " are processed; check its box and its grids");
+  }
+}
+
 /// Pitch and origin of a grid whose transform must only scale and shift.
 Lattice plainLatticeOf(const GridBase& grid, const std::string& where) {
   if (const auto lattice = latticeOf(grid)) return *lattice;
@@ -367,7 +378,8 @@ Schema schemaOf(const VdbContents& contents, const std::string& where) {
                       ": its grids have voxels beyond index 2^30; move them nearer to "
                       "index 0 in the tool that they come from");
   }
-  schema.metadata.erase(creator_key);
+  for (const char* key : {creator_key, frame_key, run_key}) schema.metadata.erase(key);
+  checkLayers(schema.lattice, where);
   return schema;
 }
 

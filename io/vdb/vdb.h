@@ -20,6 +20,10 @@ struct VdbContents {
 /// last.
 inline constexpr const char* layers_key = "vdbdither:layers";
 
+/// Metadata of an archive on a pipe: which frame it is, and of which run (frames.h). Not of a job.
+inline constexpr const char* frame_key = "vdbdither:frame";
+inline constexpr const char* run_key = "vdbdither:run";
+
 /// Metadata of a grid of half floats: its background before it was rounded.
 inline constexpr const char* half_background_key = "vdbdither:background";
 

@@ -75,8 +75,8 @@ class Names(ProgramTest):
         content = (self.folder / "part.vdb").read_bytes()
         (self.folder / "bad.vdb").write_bytes(patched(content, (b'"white"', b'"\\u001"')))
         code, printed, said = self.say("info", "bad.vdb")
-        self.assertEqual((code, said), (1, "vdbdither info: the metadata vdbdither:materials is not a table of materials: it must be a JSON "
-                                           "list of objects with index, name and rgba (four whole numbers); assign the materials again\n"))
+        self.assertEqual((code, said), (1, "vdbdither info: the metadata vdbdither:materials is not a table of materials: it is no JSON list; "
+                                           "assign the materials again\n"))
         (self.folder / "bad.vdb").write_bytes(patched(content, (b'"white"', b'"a\\n\\r"')))
         code, printed, said = self.say("info", "bad.vdb")
         self.assertEqual((code, said), (0, ""))
@@ -107,7 +107,7 @@ class Names(ProgramTest):
                 for end in ("", "--json", "--explain", "--explain --json"):
                     code, _, said = self.say("mesh2sdf", path, *MIMAKI, "-o", "y.vdb", "--overwrite", *end.split())
                     self.assertEqual((code, said), (0, ""))
-                for arguments in (("measure", path), ("measure", path, "--reference", path)):
+                for arguments in (("measure", path, "--reference", path), ("measure", path, "--reference", path, "--json")):
                     self.assertEqual(self.say(*arguments)[0], 0)
                 self.assertEqual(self.say("mesh2sdf", "no-" + path, *MIMAKI, "-o", "y.vdb")[0], 1)
                 self.assertEqual(self.say("info", "no-" + path)[0], 1)

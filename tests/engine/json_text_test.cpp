@@ -28,5 +28,15 @@ TEST(JsonText, CharactersThatSteerATerminalAreEscapedAndReadBack) {
   EXPECT_EQ(ordered_json::parse(written)["name"], text);
 }
 
+TEST(JsonText, TextThatIsNoJsonOrNestsTooDeepIsDiscarded) {
+  EXPECT_EQ(parsedJson(R"({"a": [1, "]\"["]})")["a"][1], "]\"[");
+  EXPECT_TRUE(parsedJson("").is_discarded());
+  EXPECT_TRUE(parsedJson("[1,").is_discarded());
+  EXPECT_TRUE(parsedJson("\"\xff\"").is_discarded());
+  EXPECT_FALSE(parsedJson(std::string(100, '[') + std::string(100, ']')).is_discarded());
+  EXPECT_TRUE(parsedJson(std::string(101, '[') + std::string(101, ']')).is_discarded());
+  EXPECT_TRUE(parsedJson(std::string(10'000'000, '[')).is_discarded());
+}
+
 }  // namespace
 }  // namespace vdbdither

@@ -1,5 +1,6 @@
 #include "vdbdither/engine/json_text.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <string_view>
@@ -50,10 +51,36 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
+/// The brackets of `text` that are open at once, at most.
+int depthOf(std::string_view text) {
+  int depth = 0;
+  int deepest = 0;
+  bool in_string = false;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    if (in_string && c == '\\') {
+      ++at;
+    } else if (c == '"') {
+      in_string = !in_string;
+    } else if (!in_string && (c == '[' || c == '{')) {
+      deepest = std::max(deepest, ++depth);
+    } else if (!in_string && (c == ']' || c == '}')) {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
 }  // namespace
 
 std::string jsonText(ordered_json json, int indent) {
   return escaped(withValidTexts(std::move(json)).dump(indent));
+}
+
+ordered_json parsedJson(std::string_view text) {
+  constexpr int deepest = 100;
+  if (depthOf(text) > deepest) return ordered_json::value_t::discarded;
+  return ordered_json::parse(text, nullptr, false);
 }
 
 }  // namespace vdbdither

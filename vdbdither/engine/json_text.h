@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -13,5 +14,9 @@ namespace vdbdither {
 /// UTF-8 become `\xNN` (as characters of the string), and characters that are not printable are
 /// written as JSON escapes.
 std::string jsonText(nlohmann::ordered_json json, int indent = -1);
+
+/// Returns the JSON that `text` holds. The value is discarded (`is_discarded()`) if the text is not
+/// JSON, or nests deeper than 100 levels, which functions that follow the levels could not bear.
+nlohmann::ordered_json parsedJson(std::string_view text);
 
 }  // namespace vdbdither

@@ -95,7 +95,7 @@ void printStages(const JobReport& report, double seconds) {
                  stage.seconds, stage.active_voxels, bytesText(stage.bytes).c_str(),
                  bytesText(stage.peak_memory_bytes).c_str());
     for (const auto& [name, value] : stage.counts) {
-      std::fprintf(stderr, "  %s %s", name.c_str(), shortestText(value).c_str());
+      std::fprintf(stderr, "  %s %s", printable(name).c_str(), shortestText(value).c_str());
     }
     std::fputc('\n', stderr);
   }

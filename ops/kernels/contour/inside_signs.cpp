@@ -48,9 +48,9 @@ class Around {
   const Accessor& beyond_;
 };
 
-/// A negative voxel of the band that touches a positive one beyond it.
+/// A negative voxel of the band that touches one beyond it that is not negative.
 bool lacksInside(const Voxel& a, const Voxel& b) {
-  return a.active && a.value < 0 && !b.active && b.value > 0;
+  return a.active && a.value < 0 && !b.active && !(b.value < 0);
 }
 
 /// Neighbours of opposite sign that are not both in the band.

@@ -39,7 +39,7 @@ TEST_F(GridChecks, SoundGridsOfAllTypesPass) {
   EXPECT_FALSE(faultOf(*openvdb::BoolGrid::create(true)));
   EXPECT_FALSE(faultOf(*openvdb::Int32Grid::create(-1)));
   EXPECT_FALSE(faultOf(*openvdb::Vec3SGrid::create()));
-  EXPECT_FALSE(faultOf(*openvdb::StringGrid::create()));
+  EXPECT_FALSE(faultOf(*openvdb::Vec3IGrid::create()));
 }
 
 TEST_F(GridChecks, TheFirstVoxelThatIsNotFiniteIsNamed) {
@@ -73,8 +73,17 @@ TEST_F(GridChecks, ALevelSetThatIsInsideEverywhereIsRefused) {
         checkGrids({{"surface", grid}}, "'part.vdb'");
       },
       ThrowsMessage<DataError>(
-          "'part.vdb': grid 'surface' is a level set with the background -1, so that "
+          "'part.vdb': grid 'surface' holds distances with the background -1, so that "
           "everything beyond its voxels is inside; mend it in the tool that it comes from"));
+}
+
+TEST_F(GridChecks, DistancesWithoutAClassAreCheckedByTheirName) {
+  const auto grid = FloatGrid::create(-1);
+  EXPECT_FALSE(faultOf(*grid));
+  grid->setName("surface");
+  EXPECT_THAT(faultOf(*grid), Optional(StartsWith("holds distances with the background -1, ")));
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  EXPECT_FALSE(faultOf(*grid));
 }
 
 TEST_F(GridChecks, IndicesThatBoxesCannotCountAreTold) {

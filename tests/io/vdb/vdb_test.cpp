@@ -145,6 +145,13 @@ TEST_F(Vdb, AFileOfAnotherToolHasTheBoxOfItsVoxels) {
             openvdb::CoordBBox({-8, -8, -8}, {7, 7, 7}));
 }
 
+TEST_F(Vdb, AFileIsNoFrameOfAPipe) {
+  VdbContents contents = sample();
+  contents.metadata["vdbdither:frame"] = "head";
+  contents.metadata["vdbdither:run"] = "x";
+  EXPECT_EQ(schemaOf(contents, "it").metadata.size(), 1U);
+}
+
 TEST_F(Vdb, TurnedAndUnlikeGridsAreRefused) {
   VdbContents contents = sample();
   const auto turned = openvdb::FloatGrid::create(1);
@@ -192,6 +199,10 @@ TEST_F(Vdb, BoxesThatCannotBeCountedAreRefused) {
         std::string::npos)
         << box;
   }
+  contents.metadata["vdbdither:box"] = "0 0 -500000000 1 1 500000000";
+  EXPECT_EQ(refusal([&] { schemaOf(contents, "it"); }),
+            "it has 1000000001 layers, and at most 10000000 are processed; check its box and its "
+            "grids");
   const auto far = openvdb::FloatGrid::create(1);
   far->tree().setValue({0, 0, 2147483000}, 0);
   EXPECT_NE(refusal([&] {

@@ -61,6 +61,14 @@ TEST(InsideSigns, AnOpenBandIsTold) {
   EXPECT_EQ(open.signs, InsideSigns::missing);
 }
 
+TEST(InsideSigns, ABackgroundOfZeroSaysNothing) {
+  const auto band = bandOfBall(20, nowhere);
+  const auto zero = FloatGrid::create(0);
+  for (auto value = band->cbeginValueOn(); value; ++value)
+    zero->tree().setValue(value.getCoord(), *value);
+  EXPECT_EQ(withInsideSigns(zero).signs, InsideSigns::missing);
+}
+
 TEST(InsideSigns, ALevelSetThatWasCutStaysAsItIs) {
   openvdb::initialize();
   const auto ball = openvdb::tools::createLevelSetSphere<FloatGrid>(20, {}, 1, 3);
