@@ -298,13 +298,14 @@ TEST_F(ResampleTest, SizesThatNobodyMeansAreAskedAbout) {
   ball->setTransform(openvdb::math::Transform::createLinearTransform(0.0002));
   EXPECT_THAT(
       made({write({{"a", ball}})}).warnings,
-      ElementsAre(HasSubstr("the part is 0.004 x 0.004 x 0.004 mm; are the file's numbers m? "
-                            "--unit m makes its longest side 4 mm")));
+      ElementsAre("the part is 0.004 x 0.004 x 0.004 mm; are the file's numbers m? --unit m "
+                  "makes its longest side 3.99 mm"));
   ball->setTransform(openvdb::math::Transform::createLinearTransform(0.04));
   EXPECT_THAT(
       made({write({{"a", ball}})}).warnings,
-      ElementsAre(HasSubstr("the part is 0.8 x 0.8 x 0.8 mm, fewer than 10 voxels along its "
-                            "longest side; are the file's numbers")));
+      ElementsAre("the part is 0.798 x 0.798 x 0.798 mm, fewer than 10 voxels along its "
+                  "longest side; are the file's numbers in? --unit in makes its longest side "
+                  "20.27 mm"));
 }
 
 FloatGrid::Ptr fogOfBall(double ramp_voxels, double greatest) {
@@ -329,7 +330,9 @@ TEST_F(ResampleTest, FogWhoseLevelLiesFarInsideIsAskedAbout) {
                         HasSubstr(" of its voxels, outside its surface at 0.5; if it is solid "
                                   "where it begins, give --level 0.01"))));
   const Made whole = made({write({{"fog", fogOfBall(4, 1)}}), "--level", "0.01"});
-  EXPECT_NEAR(whole.mm3, ball_mm3, near_mm3);
+  // Between its first voxel and the one before it, the fog may begin anywhere.
+  EXPECT_NEAR(whole.mm3, ball_mm3, 3);
+  EXPECT_LT(ramp.mm3, 0.7 * ball_mm3);
   EXPECT_THAT(whole.warnings, IsEmpty());
   EXPECT_THAT(made({write({{"fog", fogOfBall(1, 100)}})}).warnings,
               ElementsAre("grid 'fog' is fog of values up to 100, and its surface is taken at 0.5; "

@@ -185,6 +185,8 @@ int guardedMain(int argc, char** argv) {
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
   try {
     setStandardOutputAside();
+    // Libraries write warnings there, in their own words.
+    std::cerr.rdbuf(nullptr);
     noteInterrupts();
     initializeVdb();
     runProgram(argc, argv);
