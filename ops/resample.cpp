@@ -174,6 +174,11 @@ class Resample : public Source {
     tellUnused(contents.grids, is_asked);
     is_voxels_ = isOfVoxels(*grid);
     voxel_mm_ = picoGkVoxelMm(*grid);
+    if (!voxel_mm_ && (*grid)["PicoGK.VoxelSize"] && grid->transform().isIdentity())
+      report().warn(
+          "grid '" + grid_name_ +
+          "' comes from PicoGK, but its metadata PicoGK.VoxelSize is no length in metres; "
+          "its voxels are taken as 1 mm, see --scale");
     return withInside(asFloats(grid));
   }
 

@@ -23,6 +23,8 @@ using openvdb::MetaMap;
 
 namespace {
 
+constexpr const char* without_volume =
+    " has a transform without volume, or of numbers that are not finite";
 constexpr std::uint32_t oldest_version = openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
 
 /// Statistics that OpenVDB writes into a grid's metadata are of the file, not of the grid.
@@ -59,10 +61,11 @@ class ArchiveReader : private openvdb::io::Archive {
     part_ = "its header";
     try {
       readAll();
+      for (const GridBase::Ptr& grid : grids_) checkTransform(*grid);
     } catch (const std::ios::failure&) {
       throw unreadable("it ends too early");
     } catch (const openvdb::ArithmeticError&) {
-      throw unreadable(part_ + " has a transform without volume");
+      throw unreadable(part_ + without_volume);
     } catch (const openvdb::Exception&) {
       throw unreadable(part_ + " is damaged, or uses what OpenVDB " +
                        OPENVDB_LIBRARY_VERSION_STRING + " does not know");
@@ -79,7 +82,7 @@ class ArchiveReader : private openvdb::io::Archive {
 
   [[nodiscard]] DataError tooLarge(const std::string& what, const std::string& most) const {
     return DataError(where_ + ": " + part_ + " has " + what + "; at most " + most +
-                     " are read; remove them in the tool that it comes from");
+                     " are read; mend it in the tool that it comes from");
   }
 
   template <typename T>
@@ -210,6 +213,13 @@ class ArchiveReader : private openvdb::io::Archive {
     by_name[descriptor.uniqueName()] = grid;
     descriptors.push_back(descriptor);
     grids_.push_back(grid);
+  }
+
+  void checkTransform(const GridBase& grid) {
+    part_ = "grid '" + grid.getName() + "'";
+    if (!grid.transform().isLinear()) return;
+    const openvdb::Mat4d matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
+    if (!matrix.isFinite()) throw unreadable(part_ + without_volume);
   }
 
   void refuseMore() {

@@ -220,6 +220,10 @@ TEST_F(ResampleTest, VoxelsOfPicoGkAreAsLargeAsItsMetadataSays) {
                     "metadata says"));
   }
   EXPECT_NEAR(made({write({{"a", ball}}), "--scale", "0.5"}).mm3, ball_mm3 / 8, near_mm3 / 4);
+  const auto nonsense = ballInVoxels();
+  nonsense->insertMeta("PicoGK.VoxelSize", openvdb::StringMetadata("0.2 mm"));
+  EXPECT_THAT(made({write({{"a", nonsense}}), "--scale", "0.2"}).warnings,
+              ElementsAre(HasSubstr("its metadata PicoGK.VoxelSize is no length in metres")));
   // A transform that says something is believed.
   ball->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
   EXPECT_NEAR(made({write({{"a", ball}})}).mm3, ball_mm3 / 8, near_mm3 / 4);

@@ -1,7 +1,8 @@
 #include "io/vdb/archive_reader.h"
 
+#include <cmath>
 #include <cstring>
-#include <fstream>
+#include <limits>
 #include <sstream>
 
 #include <gmock/gmock.h>
@@ -104,7 +105,7 @@ TEST_F(ArchiveReading, CountsAndSizesAreRefusedBeforeTheyAreRead) {
   EXPECT_THAT(reading(header() + count(1000000)),
               ThrowsMessage<DataError>(
                   "it: its metadata has 1000000 entries of metadata; at most 10000 are read; "
-                  "remove them in the tool that it comes from"));
+                  "mend it in the tool that it comes from"));
   EXPECT_THAT(reading(header() + count(1) + count(0xFFFFFFF0U)),
               ThrowsMessage<DataError>(HasSubstr(
                   "its metadata has a key of metadata of 4.0 GiB; at most 4.0 KiB are read")));
@@ -177,12 +178,21 @@ TEST_F(ArchiveReading, ATransformWithoutVolumeIsNamed) {
   const auto grid = named("a");
   grid->setTransform(openvdb::math::Transform::createLinearTransform(
       openvdb::Mat4d(1., 0., 0., 0., 0., 1., 0., 0., 0.5, 0., 1., 0., 0., 0., 0., 1.)));
-  std::string bytes = streamOf({grid});
+  const std::string bytes = streamOf({grid});
   const std::size_t matrix = bytes.find("AffineMap") + 9;
   ASSERT_LT(matrix, bytes.size());
-  bytes.replace(matrix, 3 * sizeof(double), std::string(3 * sizeof(double), '\0'));
-  EXPECT_THAT(reading(bytes), ThrowsMessage<DataError>("it is not a readable VDB archive: grid 'a' "
-                                                       "has a transform without volume"));
+  const std::string refused =
+      "it is not a readable VDB archive: grid 'a' has a transform without volume, or of numbers "
+      "that "
+      "are not finite";
+  std::string flat = bytes;
+  flat.replace(matrix, 3 * sizeof(double), std::string(3 * sizeof(double), '\0'));
+  EXPECT_THAT(reading(flat), ThrowsMessage<DataError>(refused));
+  for (const double number : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+    std::string shifted = bytes;
+    shifted.replace(matrix + 12 * sizeof(double), sizeof(double), bytesOf(number));
+    EXPECT_THAT(reading(shifted), ThrowsMessage<DataError>(refused));
+  }
 }
 
 TEST_F(ArchiveReading, WhatFollowsTheArchiveIsRefused) {
