@@ -6,6 +6,7 @@
 
 #include "io/vdb/slab_reader.h"
 #include "ops/kernels/measure/grid_difference.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
@@ -76,7 +77,7 @@ class Compare : public Sink {
     for (const auto& [name, finding] : findings_) {
       if (!finding.equal()) summary += (summary.empty() ? "" : "; ") + finding.text(name);
     }
-    report().print(json_.json ? jsonText() : summary.empty() ? "equal\n" : "");
+    report().print(json_.json ? inJson() : summary.empty() ? "equal\n" : "");
     if (!summary.empty()) throw DataError("not equal to '" + path_ + "': " + summary);
   }
 
@@ -156,7 +157,7 @@ class Compare : public Sink {
     }
   }
 
-  [[nodiscard]] std::string jsonText() const {
+  [[nodiscard]] std::string inJson() const {
     ordered_json json;
     bool equal = true;
     for (const auto& [name, finding] : findings_) equal &= finding.equal();
@@ -176,7 +177,7 @@ class Compare : public Sink {
       }
       json["grids"].push_back(std::move(entry));
     }
-    return json.dump() + "\n";
+    return jsonText(json) + "\n";
   }
 
   std::string path_;

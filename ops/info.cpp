@@ -8,14 +8,17 @@
 
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
+#include "io/vdb/grid_checks.h"
 #include "io/vdb/vdb.h"
 #include "ops/kernels/measure/grid_summary.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/engine/run_options.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
+#include "vdbdither/model/printable.h"
 #include "vdbdither/model/visit_grid.h"
 
 namespace vdbdither {
@@ -50,9 +53,6 @@ std::string rowText(const openvdb::Mat4d& matrix, int column) {
 }
 
 bool isVector(const GridBase& grid) { return grid.valueType().starts_with("vec3"); }
-bool isOfNumbers(const GridBase& grid) {
-  return grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>();
-}
 bool isCarried(const GridBase& grid) {
   return grid.apply<CarriedGrids>([](const auto&) {});
 }
@@ -60,6 +60,23 @@ bool isCarried(const GridBase& grid) {
 bool hasRange(const GridBase& grid) {
   return isCarried(grid) && !grid.isType<openvdb::BoolGrid>() && !grid.isType<openvdb::MaskGrid>();
 }
+
+/// The metadata of a grid that no other line tells, as text; long values are cut.
+std::map<std::string, std::string> metadataOf(const GridBase& grid, std::size_t longest) {
+  std::map<std::string, std::string> texts;
+  for (auto entry = grid.beginMeta(); entry != grid.endMeta(); ++entry) {
+    const std::string& key = entry->first;
+    if (key == GridBase::META_GRID_NAME || key == GridBase::META_GRID_CLASS ||
+        key == GridBase::META_VECTOR_TYPE)
+      continue;
+    texts[printable(key)] = shortened(entry->second->str(), longest);
+  }
+  return texts;
+}
+
+constexpr const char* margin = "          ";
+constexpr std::size_t longest_in_text = 100;
+constexpr std::size_t longest_in_json = 1000;
 
 /// Whether all grids lie on one lattice, as those of a job do.
 bool isJob(const Grids& grids) {
@@ -86,23 +103,34 @@ Takers takersOf(const GridBase& grid, const std::string& path, const std::string
   if (!grid.transform().isLinear())
     return {{}, "no operator takes a frustum; resample it in the tool that it comes from"};
   Takers takers;
-  const auto word = [](const std::string& text) {
-    const bool plain = text.find_first_not_of(
-                           "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-/") ==
-                       std::string::npos;
-    return plain && !text.empty() ? text : "'" + text + "'";
-  };
-  if (isOfNumbers(grid))
-    takers.commands.push_back("resample " + word(path) + " --grid " + word(name) +
-                              " --printer NAME");
+  if (!isVector(grid))
+    takers.commands.push_back("resample " + quotedForShell(path) + " --grid " +
+                              quotedForShell(name) + " --printer NAME");
   if (latticeOf(grid)) {
-    takers.commands.push_back("read " + word(path) + " --grids " + word(name));
+    takers.commands.push_back("read " + quotedForShell(path) + " --grids " + quotedForShell(name));
   } else if (takers.commands.empty()) {
     takers.why_not =
-        "only numbers (float, double) are brought from a turned lattice onto a "
-        "printer's, by resample";
+        "only numbers and voxels are brought from a turned lattice onto a printer's, by resample";
   }
   return takers;
+}
+
+/// What is told of a grid.
+struct Summary : GridSummary {
+  std::optional<std::string> fault;  ///< for which every other verb refuses it
+};
+
+Summary summaryOf(const GridBase& grid) {
+  Summary summary;
+  if (isCarried(grid)) {
+    static_cast<GridSummary&>(summary) = gridSummary(grid);
+    summary.fault = faultOf(grid);
+  } else {
+    summary.active_voxels = grid.activeVoxelCount();
+    summary.box = grid.evalActiveVoxelBoundingBox();
+    summary.leaf_bytes = grid.memUsage();
+  }
+  return summary;
 }
 
 /// Describes the lattice, grids, value ranges, materials and history of a job.
@@ -115,7 +143,7 @@ class Description {
   /// Of a whole file at `path`.
   Description(const VdbContents& contents, const std::string& path)
       : schema_(schemaOf(contents, "'" + path + "'")) {
-    for (const auto& [name, grid] : contents.grids) summaries_[name] = gridSummary(*grid);
+    for (const auto& [name, grid] : contents.grids) summaries_[name] = summaryOf(*grid);
     layers_ = schema_.lattice.layers().size();
     if (const auto some = schema_.metadata.extract(layers_key)) {
       ZRange held;
@@ -142,14 +170,15 @@ class Description {
       all["lattice"]["max"] = triple(lattice.box.max());
     }
     all["layers"] = layers_;
+    all["metadata"] = otherMetadata(longest_in_json);
     all["grids"] = ordered_json::array();
     for (const auto& [name, summary] : summaries_) {
       all["grids"].push_back(gridJson(name, *schema_.grids.at(name), summary));
     }
-    const ordered_json printer = ordered_json::parse(metadata(printer_key), nullptr, false);
+    const ordered_json printer = parsedJson(metadata(printer_key));
     if (!printer.is_discarded()) all["printer"] = printer;
     all["history"] = history();
-    return all.dump() + "\n";
+    return jsonText(all) + "\n";
   }
 
   [[nodiscard]] std::string text() const {
@@ -170,18 +199,20 @@ class Description {
       const PrinterProfile profile = printerProfileFromJson(printer);
       words << "printer   " << profile.name << ", " << profile.title << "\n";
     }
+    for (const auto& [key, value] : otherMetadata(longest_in_text))
+      words << "metadata  " << key << ": " << printable(value) << "\n";
     for (const auto& [name, summary] : summaries_)
       gridText(words, name, *schema_.grids.at(name), summary);
     const char* head = "history   ";
     for (const std::string& line : history()) {
-      words << head << line << "\n";
-      head = "          ";
+      words << head << printable(line) << "\n";
+      head = margin;
     }
     return words.str();
   }
 
   [[nodiscard]] ordered_json gridJson(const std::string& name, const GridBase& grid,
-                                      const GridSummary& summary) const {
+                                      const Summary& summary) const {
     ordered_json entry = {{"name", name},
                           {"type", grid.valueType()},
                           {"class", className(grid)},
@@ -200,6 +231,8 @@ class Description {
         entry["greatest"] = summary.maximum[0];
       }
     }
+    entry["metadata"] = metadataOf(grid, longest_in_json);
+    if (summary.fault) entry["fault"] = *summary.fault;
     if (name == material_grid) {
       entry["materials"] = ordered_json::array();
       for (const auto& [value, voxels] : summary.counts) {
@@ -211,7 +244,7 @@ class Description {
   }
 
   void gridText(std::ostringstream& text, const std::string& name, const GridBase& grid,
-                const GridSummary& summary) const {
+                const Summary& summary) const {
     text << name << std::string(name.size() < 9 ? 10 - name.size() : 1, ' ') << grid.valueType();
     if (grid.getGridClass() != openvdb::GRID_UNKNOWN) text << ", " << className(grid);
     if (isVector(grid) && grid.getVectorType() != openvdb::VEC_INVARIANT)
@@ -230,10 +263,13 @@ class Description {
     text << ", " << bytesText(static_cast<double>(summary.leaf_bytes));
     if (isCarried(grid)) text << " in " << summary.leaves << " leaves";
     text << "\n";
+    if (summary.fault) text << margin << *summary.fault << "\n";
+    for (const auto& [key, value] : metadataOf(grid, longest_in_text))
+      text << margin << key << ": " << printable(value) << "\n";
     if (name != material_grid) return;
     for (const auto& [value, voxels] : summary.counts) {
       const std::string known = materialName(value);
-      text << "          " << value << " " << (known.empty() ? "(not in the table)" : known) << ": "
+      text << margin << value << " " << (known.empty() ? "(not in the table)" : known) << ": "
            << voxels << " voxels\n";
     }
   }
@@ -253,6 +289,16 @@ class Description {
                                                                           : "";
   }
 
+  /// The metadata of the file that no other line tells.
+  [[nodiscard]] std::map<std::string, std::string> otherMetadata(std::size_t longest) const {
+    std::map<std::string, std::string> texts;
+    for (const auto& [key, value] : schema_.metadata) {
+      if (key != history_key && key != printer_key && key != materials_key)
+        texts[key] = shortened(value, longest);
+    }
+    return texts;
+  }
+
   [[nodiscard]] std::vector<std::string> history() const {
     std::vector<std::string> lines;
     std::istringstream text(metadata(history_key));
@@ -265,7 +311,7 @@ class Description {
   }
 
   Schema schema_;
-  std::map<std::string, GridSummary> summaries_;
+  std::map<std::string, Summary> summaries_;
   int layers_ = 0;
 };
 
@@ -320,34 +366,33 @@ class InfoFile : public Tool {
     if (grids.size() > 1) text << "the grids lie on no common lattice; each by itself:\n";
     json["grids"] = ordered_json::array();
     for (const auto& [name, grid] : grids) {
-      GridSummary summary;
-      if (isCarried(*grid)) {
-        summary = gridSummary(*grid);
-      } else {
-        summary.active_voxels = grid->activeVoxelCount();
-        summary.box = grid->evalActiveVoxelBoundingBox();
-        summary.leaf_bytes = grid->memUsage();
-      }
+      const Summary summary = summaryOf(*grid);
       ordered_json entry = none.gridJson(name, *grid, summary);
       none.gridText(text, name, *grid, summary);
       tellPlace(*grid, entry, text);
       const Takers takers = takersOf(*grid, path_, name);
       for (const std::string& command : takers.commands)
-        text << "          vdbdither " << command << "\n";
+        text << margin << "vdbdither " << command << "\n";
       entry["takers"] = takers.commands;
       if (!takers.why_not.empty()) {
-        text << "          " << takers.why_not << "\n";
+        text << margin << takers.why_not << "\n";
         entry["why_not"] = takers.why_not;
       }
       json["grids"].push_back(std::move(entry));
     }
-    report().print(json_.json ? json.dump() + "\n" : text.str());
+    report().print(json_.json ? jsonText(json) + "\n" : text.str());
   }
 
   /// Where the voxels of a grid lie.
   static void tellPlace(const GridBase& grid, ordered_json& entry, std::ostringstream& text) {
     const openvdb::math::Transform& transform = grid.transform();
-    const char* margin = "          ";
+    if (const auto voxel_mm = picoGkVoxelMm(grid)) {
+      entry["place"] = "picogk";
+      entry["voxel_size"] = triple(openvdb::Vec3d(*voxel_mm));
+      text << margin << "PicoGK: voxels of " << shortText(*voxel_mm)
+           << " mm by its metadata, which resample honours\n";
+      return;
+    }
     entry["voxel_size"] = triple(transform.voxelSize());
     text << margin << "voxels of " << tripleText(transform.voxelSize(), " x ");
     if (const std::optional<Lattice> lattice = latticeOf(grid)) {

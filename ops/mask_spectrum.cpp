@@ -8,6 +8,7 @@
 
 #include "io/file/staged_output.h"
 #include "ops/kernels/mask/slice_spectrum.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
@@ -86,7 +87,7 @@ class MaskSpectrum : public Sink {
 
   void finish() override {
     if (!metadata_) throw DataError("no layer of a mask came");
-    const std::string text = spectra().dump(1) + "\n";
+    const std::string text = jsonText(spectra(), 1) + "\n";
     StagedOutput output(file_, StagedOutput::Kind::file);
     writeFile(output.path(), {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
               file_);

@@ -22,6 +22,7 @@
 #include "ops/kernels/mesh/solid_mesh.h"
 #include "ops/kernels/mesh/taubin.h"
 #include "ops/kernels/picture/diverging_colours.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
@@ -211,7 +212,7 @@ class SurfaceMeasurement {
     // Both files appear, or none.
     std::optional<StagedOutput> staged;
     if (!report_file_.empty()) {
-      const std::string text = all.dump(1) + "\n";
+      const std::string text = jsonText(all, 1) + "\n";
       staged.emplace(report_file_, StagedOutput::Kind::file);
       writeFile(staged->path(), {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
                 report_file_);
@@ -219,7 +220,7 @@ class SurfaceMeasurement {
     if (!map_file_.empty()) writeMap(mesh, errors, all["map_range_mm"].get<double>());
     if (staged) staged->commit();
     if (json_.json) {
-      reporter.print(all.dump(1) + "\n");
+      reporter.print(jsonText(all, 1) + "\n");
     } else if (report_file_.empty()) {
       reporter.print(plainText(all));
     }

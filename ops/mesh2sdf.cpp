@@ -6,7 +6,7 @@
 
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
-#include "io/profile/printer_profile.h"
+#include "io/profile/size_question.h"
 #include "io/profile/target_lattice.h"
 #include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/leaf/held_band.h"
@@ -188,48 +188,11 @@ class MeshToSdf : public Source {
 
   /// Warns of a part that is hardly meant to be as large or as small as it is.
   void questionSize(std::span<const Mesh> meshes, const Schema& schema) const {
-    // 3 m and 0.1 mm, as far as floats of a file tell.
-    constexpr double largest_mm = 3000 * (1 - 1e-6);
-    constexpr double minimum_mm = 0.1 * (1 + 1e-6);
-    const auto profile = schema.metadata.find(printer_key);
-    const Vec3d build_mm = profile == schema.metadata.end()
-                               ? Vec3d(0.0)
-                               : printerProfileFromJson(profile->second).build_mm;
     const MeshBounds bounds = boundsOf(meshes);
-    const Vec3d size_mm = bounds.max - bounds.min;
-    const double longest_mm = std::max({size_mm.x(), size_mm.y(), size_mm.z()});
-    const auto rounded = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4); };
-    const std::string is = "the part is " + rounded(size_mm.x()) + " x " + rounded(size_mm.y()) +
-                           " x " + rounded(size_mm.z()) + " mm";
-    if (longest_mm >= largest_mm || (longest_mm > 0 && longest_mm <= minimum_mm)) {
-      report().warn(is + "; " + likelierUnit(longest_mm));
-    } else if (build_mm != Vec3d(0, 0, 0) &&
-               (size_mm.x() > build_mm.x() || size_mm.y() > build_mm.y() ||
-                size_mm.z() > build_mm.z())) {
-      report().warn(is + ", more than the " + rounded(build_mm.x()) + " x " +
-                    rounded(build_mm.y()) + " x " + rounded(build_mm.z()) +
-                    " mm that the printer builds; turn it with --rotate, or see --unit and --fit");
-    }
-  }
-
-  /// Of the other units the one that brings the part nearest to the size of a hand.
-  [[nodiscard]] std::string likelierUnit(double longest_mm) const {
-    constexpr double hand_mm = 100;
-    std::string_view likelier;
-    double best_mm = 0;
-    for (const auto& [unit, name, meaning] : length_units) {
-      const double mm = longest_mm / mmOf(placement_.unit) * mmOf(unit);
-      const bool nearer =
-          best_mm == 0 || std::abs(std::log(mm / hand_mm)) < std::abs(std::log(best_mm / hand_mm));
-      if ((mm < longest_mm) == (longest_mm > hand_mm) && mm != longest_mm && nearer) {
-        likelier = name;
-        best_mm = mm;
-      }
-    }
-    if (likelier.empty() || placement_.fit_mm) return "is that meant?";
-    const std::string unit(likelier);
-    return "are the file's numbers " + unit + "? --unit " + unit + " makes its longest side " +
-           shortestText(std::round(best_mm * 100) / 100) + " mm";
+    if (const auto question =
+            sizeQuestion(bounds.max - bounds.min, placement_, placement_.fit_mm.has_value(), schema,
+                         "turn it with --rotate, or see --unit and --fit"))
+      report().warn(*question);
   }
 
   /// The voxels within a voxel diagonal, or the band, of the mesh's bounding box.

@@ -7,9 +7,11 @@
 
 #include "io/file/standard_streams.h"
 #include "io/profile/printer_profile.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/engine/tool.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -59,10 +61,11 @@ class Printers : public Tool {
     for (const std::string& name : installedPrinters()) {
       const PrinterProfile profile = readPrinterProfile(name);
       json.push_back(ordered_json::parse(toJson(profile)));
-      text << name << std::string(std::max<std::size_t>(24, name.size() + 1) - name.size(), ' ')
+      text << printable(name)
+           << std::string(std::max<std::size_t>(24, name.size() + 1) - name.size(), ' ')
            << lengthsText(profile.pitch_mm) << "  " << profile.title << "\n";
     }
-    return json_.json ? json.dump() + "\n" : text.str();
+    return json_.json ? jsonText(json) + "\n" : text.str();
   }
 
   [[nodiscard]] std::string show(const PrinterProfile& profile) const {
@@ -87,15 +90,15 @@ class Printers : public Tool {
   [[nodiscard]] std::string check() const {
     const std::vector<std::string> problems = printerProfileProblems(printer_);
     if (json_.json) {
-      print(ordered_json{{"profile", printer_}, {"problems", problems}}.dump() + "\n");
+      print(jsonText({{"profile", printer_}, {"problems", problems}}) + "\n");
     } else {
-      for (const std::string& problem : problems) print(problem + "\n");
+      for (const std::string& problem : problems) print(printable(problem) + "\n");
     }
     if (!problems.empty()) {
       throw DataError("'" + printer_ + "' has " + std::to_string(problems.size()) +
                       (problems.size() == 1 ? " problem" : " problems"));
     }
-    return json_.json ? "" : "'" + printer_ + "' is a proper profile\n";
+    return json_.json ? "" : "'" + printable(printer_) + "' is a proper profile\n";
   }
 
   Action action_ = Action::list;

@@ -1,10 +1,14 @@
 #include <unistd.h>
 
 #include "io/vdb/slab_reader.h"
+#include "ops/kernels/contour/inside_signs.h"
+#include "ops/kernels/leaf/held_band.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/layers.h"
+#include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 
@@ -25,6 +29,7 @@ class ReadOperator : public Source {
           "nothing is piped in; name a source first (mesh2sdf part.stl), or a file: -i part.vdb");
     }
     reader_ = std::make_unique<SlabReader>(path_, grids_.list());
+    refuseForeign();
     return reader_->schema();
   }
 
@@ -39,6 +44,30 @@ class ReadOperator : public Source {
   [[nodiscard]] Grids run(ZRange core) const override { return reader_->read(core); }
 
  private:
+  /// Refuses what other tools call a surface and would print as something else: fog, and level sets
+  /// with their inside at +background, which would be hollow.
+  void refuseForeign() const {
+    const Schema& schema = reader_->schema();
+    if (reader_->isPipe() || schema.metadata.contains(history_key)) return;
+    for (const auto& [name, prototype] : schema.grids) {
+      if (name == surface_grid && prototype->getGridClass() == openvdb::GRID_FOG_VOLUME) {
+        throw DataError(
+            "grid 'surface' is fog and holds no distances; resample --grid surface makes "
+            "them");
+      }
+      if (prototype->getGridClass() != openvdb::GRID_LEVEL_SET ||
+          !prototype->isType<openvdb::FloatGrid>() || statesHeldBand(*prototype))
+        continue;
+      const Grids whole = reader_->read(schema.lattice.layers());
+      const auto grid = openvdb::gridConstPtrCast<openvdb::FloatGrid>(whole.at(name));
+      if (withInsideSigns(grid).signs == InsideSigns::given) continue;
+      throw DataError("grid '" + name +
+                      "' is a level set with its inside at +background, as if it were hollow; "
+                      "resample --grid " +
+                      quotedForShell(name) + " fills it if its surface is closed");
+    }
+  }
+
   std::string path_;
   GridListOption grids_;
   std::unique_ptr<SlabReader> reader_;

@@ -4,11 +4,12 @@
 #include <optional>
 #include <unistd.h>
 
-#include <tbb/parallel_reduce.h>
-
+#include "io/profile/size_question.h"
 #include "io/profile/target_lattice.h"
 #include "io/vdb/frames.h"
+#include "io/vdb/grid_checks.h"
 #include "io/vdb/vdb.h"
+#include "ops/kernels/contour/inside_signs.h"
 #include "ops/kernels/distance/zero_set_distance.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/mesh/mesh_placement.h"
@@ -23,8 +24,13 @@ namespace vdbdither {
 namespace {
 
 using openvdb::FloatGrid;
+using openvdb::GridBase;
 using openvdb::Mat4d;
 using openvdb::Vec3d;
+
+/// Grids whose voxels are in the part or not.
+using VoxelGrids =
+    openvdb::TypeList<openvdb::BoolGrid, openvdb::MaskGrid, openvdb::Int32Grid, openvdb::Int64Grid>;
 
 enum class Kind { automatic, level_set, fog };
 constexpr std::array<Choice<Kind>, 3> kinds{
@@ -32,34 +38,61 @@ constexpr std::array<Choice<Kind>, 3> kinds{
      {Kind::level_set, "level-set", "A level set: inside below the level"},
      {Kind::fog, "fog", "A fog volume: inside above the level"}}};
 
+bool isOfNumbers(const GridBase& grid) {
+  return grid.isType<FloatGrid>() || grid.isType<openvdb::DoubleGrid>();
+}
+
+bool isOfVoxels(const GridBase& grid) {
+  return grid.apply<VoxelGrids>([](const auto&) {});
+}
+
+/// 1 in the active voxels that are not 0, and 0 elsewhere.
+template <typename GridT>
+FloatGrid::Ptr fogOf(const GridT& grid) {
+  using ValueT = typename GridT::ValueType;
+  const auto fog = FloatGrid::create(
+      std::make_shared<openvdb::FloatTree>(grid.tree(), 0.0F, 1.0F, openvdb::TopologyCopy()));
+  if constexpr (!std::is_same_v<GridT, openvdb::MaskGrid>) {
+    openvdb::CoordBBox box;
+    for (auto value = grid.cbeginValueOn(); value; ++value) {
+      if (*value != ValueT(0)) continue;
+      value.getBoundingBox(box);
+      fog->tree().fill(box, 0.0F, false);
+    }
+  }
+  fog->setTransform(grid.transform().copy());
+  return fog;
+}
+
+/// Numbers as floats, and voxels as fog. Null for other types.
 FloatGrid::ConstPtr asFloats(const GridConstPtr& grid) {
   if (auto floats = openvdb::gridConstPtrCast<FloatGrid>(grid)) return floats;
   if (const auto doubles = openvdb::gridConstPtrCast<openvdb::DoubleGrid>(grid))
     return std::make_shared<FloatGrid>(*doubles);
-  return nullptr;
+  FloatGrid::ConstPtr fog;
+  grid->apply<VoxelGrids>([&](const auto& typed) { fog = fogOf(typed); });
+  return fog;
 }
 
-void checkFinite(const FloatGrid& grid, const std::string& name) {
-  std::vector<const openvdb::FloatTree::LeafNodeType*> leaves;
-  grid.tree().getNodes(leaves);
-  const bool finite = tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, leaves.size()), true,
-      [&](const auto& range, bool good) {
-        for (std::size_t n = range.begin(); n != range.end() && good; ++n) {
-          const float* values = leaves[n]->buffer().data();
-          good = std::all_of(values, values + openvdb::FloatTree::LeafNodeType::SIZE,
-                             [](float value) { return std::isfinite(value); });
-        }
-        return good;
-      },
-      std::logical_and<>());
-  bool tiles = true;
-  auto tile = grid.tree().cbeginValueAll();
-  tile.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) tiles = tiles && std::isfinite(*tile);
-  if (!finite || !tiles)
-    throw DataError("grid '" + name + "' holds values that are not finite numbers");
+/// How much of a fog volume there is, in voxels.
+struct FogAmount {
+  double any = 0;    ///< above 0
+  double above = 0;  ///< above the level
+  float greatest = 0;
+};
+
+FogAmount amountOf(const FloatGrid& fog, float level) {
+  FogAmount amount;
+  for (auto value = fog.cbeginValueOn(); value; ++value) {
+    const auto voxels = static_cast<double>(value.getVoxelCount());
+    if (*value > 0) amount.any += voxels;
+    if (*value > level) amount.above += voxels;
+    amount.greatest = std::max(amount.greatest, *value);
+  }
+  return amount;
 }
+
+std::string rounded(double value) { return shortestText(std::round(value * 1e4) / 1e4); }
 
 /// `surface` from a level set or a fog volume of another tool.
 class Resample : public Source {
@@ -70,7 +103,8 @@ class Resample : public Source {
         "The .vdb of any tool, with any affine transform; standard input if missing or -", false);
     target_.declare(options);
     options.text("grid", grid_name_, "NAME",
-                 "Grid to take; by default 'surface', or the only grid of numbers");
+                 "Grid to take; by default 'surface', or the only grid of numbers, or else of "
+                 "voxels (bool, mask, whole numbers)");
     options.choice("kind", kind_, kinds, "Which side of the surface is inside");
     options.number("level", level_, {-1e30, 1e30},
                    "Value at the surface; by default 0 in a level set and 0.5 in fog");
@@ -86,6 +120,7 @@ class Resample : public Source {
     const FloatGrid::ConstPtr grid = readSurface(schema);
     surface_ = zeroSet(grid, pitch_mm);
     const ZeroSet::Bounds bounds = surface_->bounds();
+    questionSize(bounds.max - bounds.min, pitch_mm, schema);
     const Band band{1, band_mm_.value_or(0)};
     schema.lattice =
         latticeAround(bounds.min, bounds.max, std::max(pitch_mm.length(), band.mm), pitch_mm);
@@ -120,38 +155,97 @@ class Resample : public Source {
   FloatGrid::ConstPtr readSurface(Schema& schema) {
     if (isPipe() && ::isatty(STDIN_FILENO))
       throw UsageError("nothing is piped in; name a file: resample part.vdb");
+    const std::string where = isPipe() ? "standard input" : "'" + path_ + "'";
     const VdbContents contents =
-        isPipe() ? FrameReader::readWhole(STDIN_FILENO, "standard input") : readVdb(path_);
+        isPipe() ? FrameReader::readWhole(STDIN_FILENO, where) : readVdb(path_);
     if (const auto history = contents.metadata.find(history_key);
         history != contents.metadata.end()) {
       schema.metadata.insert(*history);
     }
-    FloatGrid::ConstPtr grid = asFloats(chosen(contents.grids));
-    if (!grid)
-      throw DataError("grid '" + grid_name_ + "' is of " +
-                      contents.grids.at(grid_name_)->valueType() + ", not of float or double");
+    const bool is_asked = !grid_name_.empty();
+    const GridConstPtr grid = chosen(contents.grids);
+    if (!isOfNumbers(*grid) && !isOfVoxels(*grid))
+      throw DataError("grid '" + grid_name_ + "' is of " + grid->valueType() +
+                      ", not of float, double, bool, mask or whole numbers");
     if (!grid->transform().isLinear())
       throw DataError("grid '" + grid_name_ +
                       "' lies in a frustum; only affine transforms will do");
-    checkFinite(*grid, grid_name_);
-    return grid;
+    checked(Grids::value_type(grid_name_, grid), where);
+    tellUnused(contents.grids, is_asked);
+    is_voxels_ = isOfVoxels(*grid);
+    voxel_mm_ = picoGkVoxelMm(*grid);
+    if (!voxel_mm_ && (*grid)["PicoGK.VoxelSize"] && grid->transform().isIdentity())
+      report().warn(
+          "grid '" + grid_name_ +
+          "' comes from PicoGK, but its metadata PicoGK.VoxelSize is no length in metres; "
+          "its voxels are taken as 1 mm, see --scale");
+    return withInside(asFloats(grid));
+  }
+
+  /// Names the grids that are left out, which may be parts of the same thing, unless the user chose
+  /// among them.
+  void tellUnused(const Grids& grids, bool is_asked) const {
+    std::string others;
+    for (const auto& [name, grid] : grids) {
+      if (name == grid_name_) continue;
+      others += (others.empty() ? "'" : ", '") + name + "' (" + grid->valueType() + ")";
+    }
+    const bool has_namesake = grids.contains(grid_name_ + "_2");
+    if (others.empty() || (is_asked && !has_namesake)) return;
+    report().warn("only grid '" + grid_name_ + "' is used, not " + others +
+                  (has_namesake ? "; '" + grid_name_ +
+                                      "_2' is a second grid of that name; csg "
+                                      "--union joins what resample makes of each"
+                                : ""));
+  }
+
+  /// A level set whose inside has its sign.
+  FloatGrid::ConstPtr withInside(const FloatGrid::ConstPtr& grid) const {
+    const bool is_level_set =
+        kind_ == Kind::level_set ||
+        (kind_ == Kind::automatic && grid->getGridClass() == openvdb::GRID_LEVEL_SET);
+    // Bands of our own state their width; they are closed however thin the part is.
+    if (!is_level_set || is_voxels_ || statesHeldBand(*grid)) return grid;
+    const SignedLevelSet level_set = withInsideSigns(grid);
+    const std::string name = "grid '" + grid_name_ + "'";
+    if (level_set.signs == InsideSigns::missing) {
+      const openvdb::Coord& at = level_set.open_at;
+      throw DataError(name + " is a level set with its inside at +background, and its surface is " +
+                      "open at voxel " + std::to_string(at.x()) + " " + std::to_string(at.y()) +
+                      " " + std::to_string(at.z()) +
+                      ", so that nothing says what is inside; close the surface, or fill the signs "
+                      "(signed flood fill) in the tool that it comes from");
+    }
+    if (level_set.signs == InsideSigns::filled)
+      report().warn(name +
+                    " has its inside at +background, as if it were hollow; its surface is "
+                    "closed, and the inside is filled");
+    return level_set.grid;
+  }
+
+  void questionSize(const Vec3d& size_mm, const Vec3d& pitch_mm, const Schema& schema) const {
+    // PicoGK says how large its voxels are: then no unit is a guess.
+    const bool is_known = voxel_mm_.has_value();
+    auto question = sizeQuestion(size_mm, placement_, is_known, schema, "see --unit and --scale");
+    if (!question) question = fewVoxelsQuestion(size_mm, placement_, is_known, pitch_mm);
+    if (question) report().warn(*question);
   }
 
   GridConstPtr chosen(const Grids& grids) {
-    std::string numbers;
+    std::vector<std::string> numbers;
+    std::vector<std::string> voxels;
     std::string names;
-    int count = 0;
     for (const auto& [name, grid] : grids) {
       names += " '" + name + "'";
-      if (!grid->isType<FloatGrid>() && !grid->isType<openvdb::DoubleGrid>()) continue;
-      numbers = name;
-      ++count;
+      if (isOfNumbers(*grid)) numbers.push_back(name);
+      if (isOfVoxels(*grid)) voxels.push_back(name);
     }
     if (grid_name_.empty()) {
+      const std::vector<std::string>& likely = numbers.empty() ? voxels : numbers;
       if (grids.contains(surface_grid)) {
         grid_name_ = surface_grid;
-      } else if (count == 1) {
-        grid_name_ = numbers;
+      } else if (likely.size() == 1) {
+        grid_name_ = likely.front();
       } else {
         throw UsageError("--grid: say which of" + (names.empty() ? " no grids" : names));
       }
@@ -164,6 +258,11 @@ class Resample : public Source {
 
   /// Decides how the grid is read where the options leave it open.
   ZeroSet::Reading readingOf(const FloatGrid& grid) {
+    if (is_voxels_) {
+      if (kind_ == Kind::level_set)
+        throw UsageError("--kind: grid '" + grid_name_ + "' holds voxels and no distances");
+      kind_ = Kind::fog;
+    }
     if (kind_ == Kind::automatic) {
       const bool level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
       if (!level_set && grid.getGridClass() != openvdb::GRID_FOG_VOLUME)
@@ -172,6 +271,7 @@ class Resample : public Source {
             "' has no class that says what it is; give --kind level-set or --kind fog");
       kind_ = level_set ? Kind::level_set : Kind::fog;
     }
+    asked_level_ = level_.has_value();
     if (!level_) level_ = kind_ == Kind::fog ? 0.5 : 0;
     const ZeroSet::Reading reading{static_cast<float>(*level_), kind_ == Kind::fog};
     const float outside = grid.background();
@@ -183,7 +283,13 @@ class Resample : public Source {
 
   std::shared_ptr<const ZeroSet> zeroSet(const FloatGrid::ConstPtr& grid, const Vec3d& pitch_mm) {
     Mat4d map = grid->transform().baseMap()->getAffineMap()->getMat4();
-    map.postScale(Vec3d(placement_.mmPerUnit()));
+    if (voxel_mm_) {
+      report().warn("grid '" + grid_name_ + "' comes from PicoGK: its voxels are " +
+                    shortestText(*voxel_mm_) + " mm, as its metadata says");
+      map.postScale(Vec3d(*voxel_mm_ * placement_.scale));
+    } else {
+      map.postScale(Vec3d(placement_.mmPerUnit()));
+    }
     if (!(std::abs(map.det()) > 0))
       throw DataError("grid '" + grid_name_ + "' has a transform without volume");
     const ZeroSet::Reading reading = readingOf(*grid);
@@ -206,10 +312,35 @@ class Resample : public Source {
     auto surface = made(map);
     if (surface->cells() == 0)
       throw DataError("grid '" + grid_name_ + "' has no surface: none of its values pass " +
-                      shortestText(double{reading.level}) + "; check --kind and --level");
+                      shortestText(double{reading.level}) +
+                      (reading.above ? " (the greatest is " +
+                                           rounded(amountOf(*grid, reading.level).greatest) + ")"
+                                     : "") +
+                      "; check --kind and --level");
+    questionFog(*grid, reading, std::abs(map.det()), surface->cells() * division_mm2_ / 1.5);
     if (!placement_.on_bed) return surface;
     map.postTranslate(bedCornerMm({pitch_mm, Vec3d(0.0), {}}) - surface->bounds().min);
     return made(map);
+  }
+
+  /// Warns of fog whose level was not given and lies far from where the fog begins.
+  void questionFog(const FloatGrid& grid, const ZeroSet::Reading& reading, double voxel_mm3,
+                   double area_mm2) const {
+    if (!reading.above || is_voxels_ || asked_level_) return;
+    const FogAmount amount = amountOf(grid, reading.level);
+    const double edge_mm = std::cbrt(voxel_mm3);
+    const double depth_mm = (amount.any - amount.above) * voxel_mm3 / area_mm2;
+    const std::string fog =
+        "grid '" + grid_name_ + "' is fog of values up to " + rounded(amount.greatest);
+    if (amount.greatest > 4 * reading.level) {
+      report().warn(fog + ", and its surface is taken at 0.5; --level " +
+                    rounded(0.5 * amount.greatest) + " is half of that");
+    } else if (depth_mm > edge_mm) {
+      report().warn(fog + ", which begins about " + rounded(depth_mm) + " mm, or " +
+                    rounded(depth_mm / edge_mm) +
+                    " of its voxels, outside its surface at 0.5; if it is solid where it begins, "
+                    "give --level 0.01");
+    }
   }
 
   [[nodiscard]] double leavesOf(const Lattice& lattice, double band_mm) const {
@@ -225,10 +356,13 @@ class Resample : public Source {
   std::string grid_name_;
   Kind kind_ = Kind::automatic;
   std::optional<double> level_;
+  bool asked_level_ = false;
   PlacementOptions placement_;
   std::optional<double> band_mm_;
 
-  double division_mm2_ = 0;  ///< the mean face of a division of a cell
+  bool is_voxels_ = false;          ///< a grid of voxels, read as fog of 0 and 1
+  std::optional<double> voxel_mm_;  ///< of PicoGK
+  double division_mm2_ = 0;         ///< the mean face of a division of a cell
   double slack_mm_ = 0;
   double held_band_mm_ = 0;
   std::shared_ptr<const ZeroSet> surface_;

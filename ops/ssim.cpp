@@ -16,6 +16,7 @@
 #include "io/image/picture.h"
 #include "io/image/png_spans.h"
 #include "ops/kernels/picture/picture_similarity.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/engine/tool.h"
 #include "vdbdither/model/errors.h"
@@ -162,16 +163,16 @@ class Ssim : public Tool {
                                    double pixels_per_degree,
                                    const std::array<double, 3>& means) const {
     if (json_.json) {
-      return ordered_json{{"reference", reference_file_},
-                          {"picture", picture_file_},
-                          {"width", reference.width},
-                          {"height", reference.height},
-                          {"pixels", object},
-                          {"pixels_per_degree", pixels_per_degree},
-                          {"ssim", means[0]},
-                          {"ssim_seen", means[1]},
-                          {"flip", means[2]}}
-                 .dump(1) +
+      return jsonText({{"reference", reference_file_},
+                       {"picture", picture_file_},
+                       {"width", reference.width},
+                       {"height", reference.height},
+                       {"pixels", object},
+                       {"pixels_per_degree", pixels_per_degree},
+                       {"ssim", means[0]},
+                       {"ssim_seen", means[1]},
+                       {"flip", means[2]}},
+                      1) +
              "\n";
     }
     std::array<char, 256> text{};

@@ -8,6 +8,7 @@
 #include "io/stack/slice_spans.h"
 #include "ops/kernels/measure/histogram.h"
 #include "ops/kernels/measure/surface_area.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/find_grid.h"
@@ -163,7 +164,7 @@ class Stats : public Sink {
       if (!layers.empty()) area_mm2_ += surfaceArea(*below_, *below_, layers, lattice_.pitch_mm);
       below_.reset();
     }
-    report().print(json_.json ? jsonText() : plainText());
+    report().print(json_.json ? inJson() : plainText());
   }
 
  private:
@@ -211,7 +212,7 @@ class Stats : public Sink {
     return {{"voxels", tally.voxels}, {"ml", millilitres(tally)}, {"faces_mm2", facesMm2(tally)}};
   }
 
-  [[nodiscard]] std::string jsonText() const {
+  [[nodiscard]] std::string inJson() const {
     ordered_json all;
     all["voxel_mm3"] = lattice_.pitch_mm.product();
     if (measures(material_grid)) {
@@ -234,7 +235,7 @@ class Stats : public Sink {
       }
       if (histogram_->notFinite() > 0) all["histogram"]["not_finite"] = histogram_->notFinite();
     }
-    return all.dump() + "\n";
+    return jsonText(all) + "\n";
   }
 
   [[nodiscard]] Tally solidTally() const {

@@ -8,6 +8,7 @@
 
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -34,8 +35,10 @@ void setStandardOutputAside() {
 
 int dataOutput() { return data_descriptor; }
 
-void printData(const char* text) {
-  for (std::size_t left = std::strlen(text); left > 0;) {
+void printData(const char* given) {
+  const std::string shown = printableLines(given);
+  const char* text = shown.data();
+  for (std::size_t left = shown.size(); left > 0;) {
     const ssize_t count = ::write(data_descriptor, text, left);
     if (count < 0 && errno == EINTR) {
       throwIfInterrupted();

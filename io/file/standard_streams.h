@@ -14,7 +14,7 @@ void setStandardOutputAside();
 /// The descriptor of the real standard output.
 int dataOutput();
 
-/// Writes all of `text` there. Throws DataError.
-void printData(const char* text);
+/// Writes all of a text there, in the form of `printableLines`. Throws DataError.
+void printData(const char* given);
 
 }  // namespace vdbdither

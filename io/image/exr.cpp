@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
@@ -200,8 +201,10 @@ SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& chan
     return spans.finish();
   } catch (const DataError&) {
     throw;
-  } catch (const std::exception& error) {
-    throw DataError(std::string("is no readable EXR: ") + error.what());
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
+    throw DataError("is no readable EXR: it is damaged or of a kind that is not read");
   }
 }
 

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <memory>
+#include <new>
 #include <string>
 
 #include <ImfChannelList.h>
@@ -23,6 +25,9 @@ namespace {
 /// A height map beyond this is a mistake.
 constexpr int greatest_edge = 1 << 16;
 
+constexpr const char* in_colour = "it is in colour; a height map is grey";
+constexpr const char* damaged = "it is damaged or of a kind that is not read; save it again";
+
 std::string quoted(const std::filesystem::path& path) { return "'" + path.string() + "'"; }
 
 struct FileCloser {
@@ -30,7 +35,9 @@ struct FileCloser {
 };
 
 [[noreturn]] void failPng(png_structp png, png_const_charp text) {
-  *static_cast<std::string*>(png_get_error_ptr(png)) = text;
+  // The words of the library do not say what to do.
+  *static_cast<std::string*>(png_get_error_ptr(png)) =
+      std::strcmp(text, in_colour) == 0 ? in_colour : damaged;
   png_longjmp(png, 1);
 }
 
@@ -48,8 +55,7 @@ bool readPngRows(std::FILE* file, std::string& error, GreyImage& image, int& cha
     png_read_info(png, info);
     image.width = static_cast<int>(png_get_image_width(png, info));
     image.height = static_cast<int>(png_get_image_height(png, info));
-    if ((png_get_color_type(png, info) & PNG_COLOR_MASK_COLOR) != 0)
-      png_error(png, "it is in colour; a height map is grey");
+    if ((png_get_color_type(png, info) & PNG_COLOR_MASK_COLOR) != 0) png_error(png, in_colour);
     if (png_get_bit_depth(png, info) < 8) png_set_expand_gray_1_2_4_to_8(png);
     png_set_expand_16(png);
     png_set_strip_alpha(png);
@@ -115,8 +121,10 @@ GreyImage readExr(const std::filesystem::path& path) {
     return image;
   } catch (const DataError&) {
     throw;
-  } catch (const std::exception& error) {
-    throw DataError(quoted(path) + " is no height map: " + error.what());
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
+    throw DataError(quoted(path) + " is no height map: " + damaged);
   }
 }
 

@@ -58,8 +58,8 @@ class Decoder {
   }
 
  private:
-  [[noreturn]] static void refuse(png_structp, png_const_charp text) {
-    throw DataError(std::string("is no readable PNG: ") + text);
+  [[noreturn]] static void refuse(png_structp, png_const_charp) {
+    throw DataError("is no readable PNG: it is damaged");
   }
   static void ignore(png_structp, png_const_charp) {}
   static void read(png_structp png, png_bytep data, std::size_t size) {

@@ -140,7 +140,7 @@ std::vector<std::uint8_t> encodeTiff(const SpanImage& image, const TiffFormat& f
 SpanImage decodeTiff(std::span<const std::uint8_t> bytes, const SizeCheck& check) {
   Memory memory{{bytes.begin(), bytes.end()}, 0, ""};
   const TiffHandle tiff = open(memory, "r");
-  const auto refuse = [&] { return DataError("is no readable TIFF: " + memory.error); };
+  const auto refuse = [&] { return DataError("is no readable TIFF: it is damaged"); };
   if (!tiff) throw refuse();
   std::uint32_t width = 0;
   std::uint32_t height = 0;

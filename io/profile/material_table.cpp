@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -31,6 +34,18 @@ bool sameName(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
     return std::tolower(x) == std::tolower(y);
   });
+}
+
+/// A colour of four whole numbers from 0 to 255.
+std::optional<std::array<std::uint8_t, 4>> rgbaOf(const ordered_json& json) {
+  std::array<std::uint8_t, 4> rgba{};
+  if (!json.is_array() || json.size() != rgba.size()) return std::nullopt;
+  for (std::size_t channel = 0; channel < rgba.size(); ++channel) {
+    const ordered_json& value = json[channel];
+    if (!value.is_number_integer() || value < 0 || value > 255) return std::nullopt;
+    rgba[channel] = value;
+  }
+  return rgba;
 }
 
 }  // namespace
@@ -62,21 +77,32 @@ std::string toJson(const MaterialTable& table) {
   for (std::size_t i = 0; i < table.size(); ++i) {
     json.push_back({{"index", i + 1}, {"name", table[i].name}, {"rgba", table[i].rgba}});
   }
-  return json.dump();
+  return jsonText(json);
 }
 
 MaterialTable materialTableFromJson(const std::string& text) {
-  try {
-    MaterialTable table;
-    for (const ordered_json& entry : ordered_json::parse(text)) {
-      if (entry.at("index") != table.size() + 1) throw DataError("indices must be 1, 2, 3, …");
-      table.push_back({entry.at("name"), entry.at("rgba")});
-    }
-    return table;
-  } catch (const std::exception& error) {
-    throw DataError("metadata " + std::string(materials_key) +
-                    " is not a table of materials: " + error.what());
+  const auto refusal = [](const std::string& why) {
+    return DataError("the metadata " + std::string(materials_key) +
+                     " is not a table of materials: " + why + "; assign the materials again");
+  };
+  MaterialTable table;
+  const ordered_json json = parsedJson(text);
+  if (!json.is_array()) throw refusal("it is no JSON list");
+  for (const ordered_json& entry : json) {
+    if (!entry.is_object()) throw refusal("its entries are no JSON objects");
+    const auto rgba = rgbaOf(entry.value("rgba", ordered_json()));
+    const ordered_json name = entry.value("name", ordered_json());
+    if (!rgba || !name.is_string())
+      throw refusal("each material must have index, name and rgba, four numbers from 0 to 255");
+    if (entry.value("index", ordered_json()) != table.size() + 1)
+      throw refusal("its indices are not 1, 2, 3 …");
+    table.push_back({printable(name.get<std::string>()), *rgba});
+    // Slices of one material lie in a folder of its name.
+    const std::string& folder = table.back().name;
+    if (folder.empty() || folder.starts_with('.') || folder.find('/') != std::string::npos)
+      throw refusal("'" + folder + "' cannot be the name of a folder");
   }
+  return table;
 }
 
 Material parseMaterial(std::string_view text, const std::vector<Material>& known) {

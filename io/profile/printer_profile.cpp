@@ -9,8 +9,10 @@
 #include "io/file/data_files.h"
 #include "io/file/file_name.h"
 #include "io/file/whole_file.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/options.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -22,7 +24,7 @@ namespace {
 class ProfileParser {
  public:
   explicit ProfileParser(const std::string& text) {
-    const ordered_json json = ordered_json::parse(text, nullptr, false);
+    const ordered_json json = parsedJson(text);
     if (!json.is_object()) {
       problems_.emplace_back("the text is no JSON object");
       return;
@@ -60,7 +62,7 @@ class ProfileParser {
   }
 
   std::string text(const ordered_json& json, const char* key, const std::string& where) {
-    if (json.contains(key) && json[key].is_string()) return json[key];
+    if (json.contains(key) && json[key].is_string()) return printable(json[key].get<std::string>());
     if (json.contains(key)) problems_.push_back(where + key + " is no text");
     return "";
   }
@@ -183,7 +185,7 @@ std::string toJson(const PrinterProfile& profile) {
   for (const Material& material : profile.materials) {
     json["materials"].push_back({{"name", material.name}, {"rgba", material.rgba}});
   }
-  return json.dump();
+  return jsonText(json);
 }
 
 PrinterProfile printerProfileFromJson(const std::string& text) {

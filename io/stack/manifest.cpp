@@ -9,8 +9,10 @@
 #include "io/file/digest.h"
 #include "io/file/file_name.h"
 #include "io/stack/canonical_json.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/version.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -202,7 +204,7 @@ Manifest manifestOf(const ManifestParser& parser) {
   for (const ordered_json& entry : parser.list(json, "materials"))
     manifest.materials.push_back({parser.text(entry, "name"), parser.colour(entry, "rgba")});
   const ordered_json& printer = parser.member(json, "printer");
-  if (!printer.is_null()) manifest.printer = printer.dump();
+  if (!printer.is_null()) manifest.printer = jsonText(printer);
   for (const ordered_json& line : parser.list(json, "history")) {
     if (!line.is_string()) parser.refuse("'history' is no list of texts");
     manifest.history.push_back(line.get<std::string>());
@@ -239,7 +241,7 @@ std::string textOf(const Manifest& manifest) {
   const Lattice& lattice = manifest.lattice;
   ordered_json json;
   json["creator"] = std::string("vdbdither ") + version;
-  const ordered_json printer = ordered_json::parse(manifest.printer, nullptr, false);
+  const ordered_json printer = parsedJson(manifest.printer);
   json["printer"] = printer.is_discarded() ? ordered_json() : printer;
   json["format"] = manifest.format;
   json["grid"] = manifest.grid;
@@ -271,10 +273,9 @@ std::string textOf(const Manifest& manifest) {
     json["slices"].push_back(std::move(entry));
   }
   // The digest is of what a reader will parse.
-  constexpr auto replace = ordered_json::error_handler_t::replace;
-  json = ordered_json::parse(json.dump(-1, ' ', false, replace));
+  json = parsedJson(jsonText(json));
   json[digest_key] = digestOf(json);
-  return json.dump(1) + "\n";
+  return jsonText(json, 1) + "\n";
 }
 
 Manifest readManifest(const StackInput& stack, EditedStack edited,

@@ -4,6 +4,7 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -11,10 +12,11 @@
 #include <unistd.h>
 #include <vector>
 
-#include <openvdb/io/Stream.h>
-#include <openvdb/tools/ChangeBackground.h>
+#include <openvdb/io/Archive.h>
 
 #include "io/vdb/archive_digest.h"
+#include "io/vdb/archive_reader.h"
+#include "io/vdb/grid_checks.h"
 #include "vdbdither/engine/options.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/known_grids.h"
@@ -30,8 +32,6 @@ using openvdb::Vec3d;
 namespace {
 
 constexpr const char* box_key = "vdbdither:box";
-/// Of a grid of half floats: its background before it was rounded.
-constexpr const char* background_key = "vdbdither:background";
 
 std::uint32_t compressionFlags(VdbCodec codec) {
   switch (codec) {
@@ -71,7 +71,7 @@ class StreamArchive : public openvdb::io::Archive {
     if (type != "float" && type != "double" && !type.starts_with("vec3")) return;
     metadata.insertMeta(GridBase::META_SAVE_HALF_FLOAT, openvdb::BoolMetadata(true));
     if (const auto* numbers = dynamic_cast<const openvdb::FloatGrid*>(&grid))
-      metadata.insertMeta(background_key, openvdb::FloatMetadata(numbers->background()));
+      metadata.insertMeta(half_background_key, openvdb::FloatMetadata(numbers->background()));
   }
 
   openvdb::GridCPtrVec grids_;
@@ -80,67 +80,51 @@ class StreamArchive : public openvdb::io::Archive {
 
 std::string quoted(const std::filesystem::path& path) { return "'" + path.string() + "'"; }
 
-/// Statistics that OpenVDB writes into a grid's metadata are of the file, not of the grid.
-void dropFileStatistics(GridBase& grid) {
-  std::vector<std::string> keys;
-  for (auto entry = grid.beginMeta(); entry != grid.endMeta(); ++entry) {
-    if (entry->first.starts_with("file_")) keys.push_back(entry->first);
-  }
-  for (const std::string& key : keys) grid.removeMeta(key);
-}
-
-/// A grid that was read from half floats is one of floats; whether it is written as such again is
-/// another matter.
-void dropHalf(GridBase& grid) {
-  if (!grid.saveFloatAsHalf()) return;
-  grid.setSaveFloatAsHalf(false);
-  const auto background = grid.getMetadata<openvdb::FloatMetadata>(background_key);
-  auto* numbers = dynamic_cast<openvdb::FloatGrid*>(&grid);
-  if (background && numbers) openvdb::tools::changeBackground(numbers->tree(), background->value());
-  grid.removeMeta(background_key);
-}
-
-VdbContents collected(const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
-  VdbContents contents;
-  for (const GridBase::Ptr& grid : grids) {
-    std::string name = grid->getName();
-    for (int copy = 2; contents.grids.contains(name); ++copy)
-      name = grid->getName() + "_" + std::to_string(copy);
-    contents.grids[name] = grid;
-  }
-  for (auto entry = metadata.beginMeta(); entry != metadata.endMeta(); ++entry) {
-    contents.metadata[entry->first] = entry->second->str();
-  }
-  return contents;
-}
-
-/// Bytes that are there already, as a stream.
+/// Bytes that are there already, as a stream that can seek.
 class MemoryBuffer : public std::streambuf {
  public:
   explicit MemoryBuffer(std::string_view bytes) {
     char* begin = const_cast<char*>(bytes.data());
     setg(begin, begin, begin + bytes.size());
   }
+
+ protected:
+  pos_type seekoff(off_type offset, std::ios::seekdir from, std::ios::openmode) override {
+    const off_type size = egptr() - eback();
+    const off_type base = from == std::ios::beg   ? 0
+                          : from == std::ios::cur ? gptr() - eback()
+                                                  : size;
+    const off_type at = base + offset;
+    if (at < 0 || at > size) return pos_type(off_type(-1));
+    setg(eback(), eback() + at, egptr());
+    return pos_type(at);
+  }
+  pos_type seekpos(pos_type position, std::ios::openmode mode) override {
+    return seekoff(position, std::ios::beg, mode);
+  }
 };
 
-/// OpenVDB's Stream, not its File: without delayed loading it meets every truncation with an
-/// exception.
-VdbContents readStream(std::istream& stream, const std::string& where) {
-  // A read that comes up short must throw: OpenVDB would go on with whatever is in memory.
-  stream.exceptions(std::ios::badbit | std::ios::failbit);
-  try {
-    openvdb::io::Stream archive(stream, false);
-    const openvdb::GridPtrVecPtr grids = archive.getGrids();
-    for (const GridBase::Ptr& grid : *grids) {
-      dropFileStatistics(*grid);
-      dropHalf(*grid);
-    }
-    return collected(*grids, *archive.getMetadata());
-  } catch (const openvdb::Exception& error) {
-    throw DataError(where + " is not a readable VDB archive: " + error.what());
-  } catch (const std::ios::failure&) {
-    throw DataError(where + " is not a readable VDB archive: it ends too early");
+std::uint64_t sizeOf(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) throw DataError("cannot read " + quoted(path) + ": " + error.message());
+  return size;
+}
+
+/// Refuses a file that has not the length that its archive states.
+void checkLength(std::istream& file, std::uint64_t length, const std::filesystem::path& path) {
+  const std::uint64_t size = sizeOf(path);
+  if (size == length) return;
+  if (size < length) {
+    throw DataError(quoted(path) + " is cut short: it was written with " + std::to_string(length) +
+                    " bytes");
   }
+  file.seekg(static_cast<std::streamoff>(length));
+  std::string begin(std::min<std::uint64_t>(size - length, sizeof(std::int64_t)), '\0');
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  throw DataError(quoted(path) +
+                  " goes on behind its archive: " + whatFollows(begin, size - length) +
+                  "; what was meant for a pipe is read from standard input");
 }
 
 std::ifstream openArchive(const std::filesystem::path& path) {
@@ -163,27 +147,19 @@ std::ifstream openArchive(const std::filesystem::path& path) {
   }
   file.clear();
   file.seekg(0);
-  if (const auto length = statedLength(head);
-      length && *length != std::filesystem::file_size(path, none)) {
-    throw DataError(quoted(path) + " is cut short: it was written with " + std::to_string(*length) +
-                    " bytes");
-  }
+  if (const auto length = statedLength(head)) checkLength(file, *length, path);
   return file;
 }
 
-/// The UUID that the archive in `file` should have and the one it has.
-std::pair<std::string, std::string> uuidsOf(std::istream& file) {
+/// The UUID that the archive in `file` should have.
+std::string uuidOf(std::istream& file) {
   ArchiveDigest digest;
-  std::string head;
   std::vector<char> buffer(1 << 20);
-  while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())), file.gcount() > 0) {
-    if (head.empty())
-      head.assign(buffer.data(), std::min<std::size_t>(file.gcount(), archive_head_size));
+  while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())), file.gcount() > 0)
     digest.update(buffer.data(), static_cast<std::size_t>(file.gcount()));
-  }
   file.clear();
   file.seekg(0);
-  return {digest.uuid(), statedLength(head) ? head.substr(uuid_offset) : ""};
+  return digest.uuid();
 }
 
 std::string boxText(const CoordBBox& box) {
@@ -201,8 +177,24 @@ CoordBBox parseBox(const std::string& text, const std::string& where) {
   for (Coord* corner : {&box.min(), &box.max()}) {
     for (int axis = 0; axis < 3; ++axis) stream >> (*corner)[axis];
   }
-  if (!stream) throw DataError(where + ": the metadata " + box_key + " is not six whole numbers");
+  const bool counted = box.empty() || (isCountable(box.min()) && isCountable(box.max()));
+  if (!stream || !counted) {
+    throw DataError(where + ": the metadata " + box_key +
+                    " is not six whole numbers from -2^30 "
+                    "to 2^30; make the file again");
+  }
   return box;
+}
+
+/// Refuses a box that is taller than any print: the run would take days to find nothing.
+void checkLayers(const Lattice& lattice, const std::string& where) {
+  constexpr std::int64_t most = 10'000'000;
+  const std::int64_t layers =
+      lattice.box.empty() ? 0 : std::int64_t{lattice.box.max().z()} - lattice.box.min().z() + 1;
+  if (layers > most) {
+    throw DataError(where + " has " + std::to_string(layers) + " layers, and at most " +
+                    std::to_string(most) + " are processed; check its box and its grids");
+  }
 }
 
 /// Pitch and origin of a grid whose transform must only scale and shift.
@@ -211,14 +203,37 @@ Lattice plainLatticeOf(const GridBase& grid, const std::string& where) {
   const std::string refused = where + ": grid '" + grid.getName() + "' ";
   if (!grid.transform().isLinear())
     throw DataError(refused + "lies in a frustum; resample it in the tool that it comes from");
-  throw DataError(refused + "is turned or sheared; resample --grid " + grid.getName() +
-                  " brings numbers onto the printer's lattice");
+  const std::string resample = "resample --grid " + quotedForShell(grid.getName());
+  if (const auto voxel_mm = picoGkVoxelMm(grid)) {
+    throw DataError(
+        refused + "comes from PicoGK, with an identity as its transform and voxels of " +
+        shortestText(*voxel_mm) + " mm in its metadata, which " + resample + " honours");
+  }
+  throw DataError(refused + "is turned, mirrored or sheared; " + resample +
+                  " brings it onto the printer's lattice");
 }
 
 }  // namespace
 
+std::optional<double> picoGkVoxelMm(const GridBase& grid) {
+  constexpr double mm_per_metre = 1000;
+  const openvdb::Metadata::ConstPtr stated = grid["PicoGK.VoxelSize"];
+  if (!stated || !grid.transform().isIdentity()) return std::nullopt;
+  double metres = 0;
+  if (const auto* single = dynamic_cast<const openvdb::FloatMetadata*>(stated.get())) {
+    // The decimal number that the float stands for: 0.0002 and not 0.000199999995.
+    std::array<char, 32> digits{};
+    const auto end = std::to_chars(digits.begin(), digits.end(), single->value()).ptr;
+    std::from_chars(digits.begin(), end, metres);
+  } else if (const auto* number = dynamic_cast<const openvdb::DoubleMetadata*>(stated.get())) {
+    metres = number->value();
+  }
+  if (!std::isfinite(metres) || !(metres > 0)) return std::nullopt;
+  return metres * mm_per_metre;
+}
+
 std::optional<Lattice> latticeOf(const GridBase& grid) {
-  if (!grid.transform().isLinear()) return std::nullopt;
+  if (!grid.transform().isLinear() || picoGkVoxelMm(grid)) return std::nullopt;
   const openvdb::Mat4d matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
   Lattice lattice;
   for (int row = 0; row < 3; ++row) {
@@ -226,6 +241,7 @@ std::optional<Lattice> latticeOf(const GridBase& grid) {
       if ((row == column) ? !(matrix(row, column) > 0) : matrix(row, column) != 0)
         return std::nullopt;
     }
+    if (!std::isfinite(matrix(row, row)) || !std::isfinite(matrix(3, row))) return std::nullopt;
     lattice.pitch_mm[row] = matrix(row, row);
     lattice.origin_mm[row] = matrix(3, row);
   }
@@ -273,7 +289,7 @@ VdbContents contentsOfBytes(std::string_view bytes, const std::string& where) {
     throw DataError(where + " is not a readable VDB archive: it is too short");
   MemoryBuffer buffer(bytes);
   std::istream stream(&buffer);
-  return readStream(stream, where);
+  return readArchive(stream, bytes.size(), where);
 }
 
 void initializeVdb() { openvdb::initialize(); }
@@ -302,7 +318,7 @@ void writeVdb(const std::filesystem::path& path, const VdbContents& contents, Vd
     file.flush();
     file.exceptions(std::ios::badbit);
     file.seekg(0);
-    const std::string uuid = uuidsOf(file).first;
+    const std::string uuid = uuidOf(file);
     file.exceptions(std::ios::badbit | std::ios::failbit);
     file.seekp(uuid_offset);
     file.write(uuid.data(), uuid_size);
@@ -314,19 +330,21 @@ void writeVdb(const std::filesystem::path& path, const VdbContents& contents, Vd
 
 VdbContents readVdb(const std::filesystem::path& path) {
   std::ifstream file = openArchive(path);
+  std::string head(archive_head_size, 0);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  file.seekg(0);
   // Before OpenVDB sees it, which takes damaged bytes as they are.
-  const auto [computed, stated] = uuidsOf(file);
-  if (!stated.empty() && stated != computed) {
+  if (statedLength(head) && head.substr(uuid_offset) != uuidOf(file)) {
     throw DataError(quoted(path) + " is damaged: its checksum does not match; make it again");
   }
-  return readStream(file, quoted(path));
+  return readArchive(file, sizeOf(path), quoted(path));
 }
 
 GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name) {
   const VdbContents contents = readVdb(path);
   if (const auto found = contents.grids.find(name); found != contents.grids.end())
-    return found->second;
-  if (contents.grids.size() == 1) return contents.grids.begin()->second;
+    return checked(*found, quoted(path));
+  if (contents.grids.size() == 1) return checked(*contents.grids.begin(), quoted(path));
   std::string message = quoted(path) + " has no grid '" + name + "'; it has";
   for (const auto& [known, grid] : contents.grids) message += " " + known;
   throw DataError(message);
@@ -354,8 +372,14 @@ Schema schemaOf(const VdbContents& contents, const std::string& where) {
   } else {
     for (const auto& [name, grid] : contents.grids)
       schema.lattice.box.expand(grid->evalActiveVoxelBoundingBox());
+    const CoordBBox& box = schema.lattice.box;
+    if (!box.empty() && !(isCountable(box.min()) && isCountable(box.max())))
+      throw DataError(where +
+                      ": its grids have voxels beyond index 2^30; move them nearer to "
+                      "index 0 in the tool that they come from");
   }
-  schema.metadata.erase(creator_key);
+  for (const char* key : {creator_key, frame_key, run_key}) schema.metadata.erase(key);
+  checkLayers(schema.lattice, where);
   return schema;
 }
 

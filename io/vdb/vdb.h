@@ -20,6 +20,13 @@ struct VdbContents {
 /// last.
 inline constexpr const char* layers_key = "vdbdither:layers";
 
+/// Metadata of an archive on a pipe: which frame it is, and of which run (frames.h). Not of a job.
+inline constexpr const char* frame_key = "vdbdither:frame";
+inline constexpr const char* run_key = "vdbdither:run";
+
+/// Metadata of a grid of half floats: its background before it was rounded.
+inline constexpr const char* half_background_key = "vdbdither:background";
+
 /// How the voxels of an archive are packed. Inactive values are never stored.
 enum class VdbCodec { none, mask, blosc };
 
@@ -37,18 +44,23 @@ void initializeVdb();
 void writeVdb(const std::filesystem::path& path, const VdbContents& contents, VdbCodec codec,
               const std::filesystem::path& shown, bool as_half = false);
 
-/// Reads a whole archive and checks its digest where it carries one. Throws DataError naming
-/// `path`.
+/// Reads a whole archive, whatever its grids hold (grid_checks.h), and checks its digest where it
+/// carries one. Throws DataError naming `path`, also for an archive that another one follows.
 VdbContents readVdb(const std::filesystem::path& path);
 
-/// The grid called `name` of a file; any name where the file has only one grid. Throws DataError.
+/// The grid called `name` of a file; any name where the file has only one grid. Throws DataError,
+/// also for a grid that `checkGrid` refuses.
 GridConstPtr readGrid(const std::filesystem::path& path, const std::string& name);
 
 /// The archive as bytes, digest included.
 std::string archiveBytes(const VdbContents& contents, VdbCodec codec);
 
+/// The edge of a voxel in mm that PicoGK states in the metadata of a grid (`PicoGK.VoxelSize`, in
+/// metres), the transform of which it leaves an identity. Nothing of any other grid.
+std::optional<double> picoGkVoxelMm(const openvdb::GridBase& grid);
+
 /// Pitch and origin of a grid whose transform only scales and shifts, without a box; nothing of
-/// one that is turned, mirrored, sheared or a frustum.
+/// one that is turned, mirrored, sheared, a frustum, or of PicoGK.
 std::optional<Lattice> latticeOf(const openvdb::GridBase& grid);
 
 /// The lattice, printer and history that metadata and transforms state. Files of other tools get

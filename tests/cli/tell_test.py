@@ -135,7 +135,7 @@ class Tell(ProgramTest):
                                r"          vdbdither read mixed\.vdb --grids coarse\n"
                                r"fine      bool: 1000 voxels")
         grids = {grid["name"]: grid for grid in json.loads(self.succeed("info", "mixed.vdb", "--json"))["grids"]}
-        self.assertEqual(grids["fine"]["takers"], ["read mixed.vdb --grids fine"])
+        self.assertEqual(grids["fine"]["takers"], ["resample mixed.vdb --grid fine --printer NAME", "read mixed.vdb --grids fine"])
         self.assertEqual((grids["coarse"]["place"], grids["coarse"]["voxel_size"]), ("plain", [2, 2, 2]))
 
     def test_info_describes_rotated_grids_and_resample_reads_them(self):
@@ -143,12 +143,12 @@ class Tell(ProgramTest):
         told = self.succeed("info", "turned.vdb").decode()
         self.assertIn("          voxels of 0.1 x 0.1 x 0.2, turned, mirrored or sheared: x y z of index i j k are\n"
                       "            0 -0.1 0 5\n", told)
-        self.assertIn("only numbers (float, double) are brought from a turned lattice", told)
+        self.assertIn("only numbers and voxels are brought from a turned lattice", told)
         density = json.loads(self.succeed("info", "turned.vdb", "--json"))["grids"][0]
         self.assertEqual((density["place"], density["matrix"][0]), ("affine", [0, -0.1, 0, 5]))
         command, = density["takers"]
         self.succeed("run", command.replace("NAME", "mimaki-3duj-553") + " --kind fog -o part.vdb --overwrite")
-        self.refuse(1, "is turned or sheared; resample --grid ", "read", "turned.vdb", "!", "info")
+        self.refuse(1, "is turned, mirrored or sheared; resample --grid ", "read", "turned.vdb", "!", "info")
 
     def test_info_reports_that_no_operator_reads_a_frustum(self):
         self.foreign("camera.vdb", [("density", "FloatGrid", self.frustum)])

@@ -152,7 +152,7 @@ TEST(Options, CanonicalTextIsOneLine) {
   Example example;
   example.options.parse(Words{"a\n\x1b[1m'\\b"});
   const std::string canonical = example.options.canonical();
-  EXPECT_TRUE(canonical.starts_with("$'a\\x0a\\x1b[1m\\'\\\\b' ")) << canonical;
+  EXPECT_TRUE(canonical.starts_with("$'a\\n\\x1b[1m\\'\\\\b' ")) << canonical;
   EXPECT_EQ(splitWords(canonical).front(), "a\n\x1b[1m'\\b");
 }
 

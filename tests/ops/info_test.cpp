@@ -1,3 +1,4 @@
+#include <cmath>
 #include <memory>
 
 #include <gmock/gmock.h>
@@ -10,6 +11,7 @@
 #include "tests/support/drawn_grids.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/sinks.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 namespace {
@@ -73,6 +75,65 @@ TEST(Info, AnEmptyGridHasNoRange) {
   EXPECT_EQ(found["grids"][0]["type"], "vec3s");
   EXPECT_EQ(found["grids"][0]["active_voxels"], 0);
   EXPECT_FALSE(found["grids"][0].contains("least"));
+}
+
+/// What `info` says of a file of `contents`, in words or as JSON.
+std::string toldOfFile(const VdbContents& contents, std::vector<std::string> arguments = {}) {
+  initializeVdb();
+  const test::ScratchFolder scratch;
+  const std::string path = scratch / "a.vdb";
+  writeVdb(path, contents, VdbCodec::mask, path);
+  arguments.insert(arguments.begin(), path);
+  const test::FileToolCalled info("info", arguments);
+  info.run();
+  return info.said.printed;
+}
+
+TEST(Info, TellsMetadataCutAndWithoutEffectOnATerminal) {
+  const auto grid = openvdb::FloatGrid::create();
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  grid->insertMeta("author", openvdb::StringMetadata("a\x1b[31m\nhistory   forged"));
+  grid->insertMeta("k\ney", openvdb::Int32Metadata(7));
+  grid->insertMeta("notes", openvdb::StringMetadata(std::string(5000000, 'x')));
+  const VdbContents contents{{{"density", grid}}, {{"scene", "b\xff"}, {history_key, "a\x1b\nb"}}};
+  const std::string text = toldOfFile(contents);
+  EXPECT_THAT(text, testing::HasSubstr("\nmetadata  scene: b\\xff\n"));
+  EXPECT_THAT(text, testing::HasSubstr("\n          author: a\\x1b[31m\\nhistory   forged\n"));
+  EXPECT_THAT(text, testing::HasSubstr("\n          k\\ney: 7\n"));
+  EXPECT_THAT(text, testing::HasSubstr("\n          notes: " + std::string(100, 'x') +
+                                       "... (5000000 bytes)\n"));
+  EXPECT_THAT(text, testing::HasSubstr("\nhistory   a\\x1b\n          b\n"));
+  const json found = json::parse(toldOfFile(contents, {"--json"}));
+  EXPECT_EQ(found["metadata"], json::parse(R"({"scene": "b\\xff"})"));
+  const json& of_grid = found["grids"][0]["metadata"];
+  EXPECT_EQ(of_grid["author"], "a\x1b[31m\nhistory   forged");
+  EXPECT_EQ(of_grid["k\\ney"], "7");
+  EXPECT_EQ(of_grid["notes"], std::string(1000, 'x') + "... (5000000 bytes)");
+  EXPECT_FALSE(of_grid.contains("name"));
+  EXPECT_FALSE(of_grid.contains("class"));
+}
+
+TEST(Info, TellsWhatOtherVerbsRefuse) {
+  const auto grid = openvdb::FloatGrid::create(1);
+  grid->tree().setValue(Coord(1, 2, 3), std::nanf(""));
+  const VdbContents contents{{{"surface", grid}}, {}};
+  EXPECT_THAT(
+      toldOfFile(contents),
+      testing::HasSubstr("\n          holds nan at voxel 1 2 3, which is not a finite number"));
+  EXPECT_THAT(json::parse(toldOfFile(contents, {"--json"}))["grids"][0]["fault"].get<std::string>(),
+              testing::StartsWith("holds nan at voxel 1 2 3"));
+}
+
+TEST(Info, TellsTheVoxelsOfPicoGk) {
+  const auto grid = openvdb::FloatGrid::create(3);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->insertMeta("PicoGK.VoxelSize", openvdb::FloatMetadata(0.0002F));
+  const VdbContents contents{{{"ball", grid}}, {}};
+  const std::string text = toldOfFile(contents);
+  EXPECT_THAT(text, testing::HasSubstr("PicoGK: voxels of 0.2 mm by its metadata"));
+  EXPECT_THAT(text, testing::HasSubstr("vdbdither resample "));
+  EXPECT_THAT(text, testing::Not(testing::HasSubstr("vdbdither read ")));
+  EXPECT_EQ(json::parse(toldOfFile(contents, {"--json"}))["grids"][0]["place"], "picogk");
 }
 
 TEST(Info, SaysThatNothingTakesPoints) {

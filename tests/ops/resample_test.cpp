@@ -6,6 +6,7 @@
 
 #include "io/vdb/vdb.h"
 #include "tests/support/scratch_folder.h"
+#include "tests/support/told.h"
 #include "tests/support/volumes.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/registry.h"
@@ -18,7 +19,10 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::Vec3d;
+using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::ThrowsMessage;
 
 /// A level set or fog as other tools write them.
@@ -114,7 +118,8 @@ TEST_F(ResampleTest, TakesTheGridThatItIsTold) {
   EXPECT_THAT(planning(grids, {"--grid", "bell"}),
               ThrowsMessage<UsageError>("--grid: no grid 'bell'; there are 'ball' 'density' 'v'"));
   EXPECT_THAT(planning(grids, {"--grid", "v"}),
-              ThrowsMessage<DataError>("grid 'v' is of vec3s, not of float or double"));
+              ThrowsMessage<DataError>(
+                  "grid 'v' is of vec3s, not of float, double, bool, mask or whole numbers"));
 }
 
 TEST_F(ResampleTest, RefusesWhatHasNoSurface) {
@@ -141,7 +146,9 @@ TEST_F(ResampleTest, RefusesWhatIsNoNumberAndWhatIsNoLattice) {
     const auto grid = levelSet();
     grid->tree().setValueOn(Coord(15, 0, 0), bad);
     EXPECT_THAT(planning({{"ball", grid}}),
-                ThrowsMessage<DataError>("grid 'ball' holds values that are not finite numbers"));
+                ThrowsMessage<DataError>(
+                    AllOf(HasSubstr("part.vdb': grid 'ball' holds "),
+                          HasSubstr(" at voxel 15 0 0, which is not a finite number"))));
   }
   const auto frustum = levelSet();
   frustum->setTransform(openvdb::math::Transform::createFrustumTransform(
@@ -152,6 +159,188 @@ TEST_F(ResampleTest, RefusesWhatIsNoNumberAndWhatIsNoLattice) {
               ThrowsMessage<DataError>(HasSubstr("more voxels than can be counted")));
   EXPECT_THAT([] { source({"nowhere.vdb"})->plan(); },
               ThrowsMessage<DataError>(HasSubstr("no such file 'nowhere.vdb'")));
+}
+
+/// The volume in mm3 of what `arguments` make on cubes of 0.1 mm, and what is said about it.
+struct Made {
+  double mm3 = 0;
+  std::vector<std::string> warnings;
+};
+
+Made made(std::vector<std::string> arguments) {
+  arguments.insert(arguments.end(), {"--pitch", "0.1mm,0.1mm,0.1mm"});
+  const auto verb = findOperator("resample").make();
+  Options options;
+  verb->declare(options);
+  test::Listener listener;
+  verb->setReporter(&listener);
+  options.parse(arguments);
+  auto& source = dynamic_cast<Source&>(*verb);
+  const Schema schema = source.plan();
+  const auto surface =
+      openvdb::gridConstPtrCast<FloatGrid>(source.run(schema.lattice.layers()).at("surface"));
+  int inside = 0;
+  for (const Coord& ijk : schema.lattice.box) inside += surface->tree().getValue(ijk) < 0;
+  return {inside * 1e-3, listener.warnings};
+}
+
+constexpr double ball_mm3 = 33.51;  ///< of 2 mm
+constexpr double near_mm3 = 0.7;
+
+/// A ball of 2 mm on cubes of 0.2 mm: distances in voxels, and an identity for its transform.
+FloatGrid::Ptr ballInVoxels() {
+  const auto grid = FloatGrid::create(3);
+  for (const Coord& ijk : CoordBBox(Coord(-14), Coord(14))) {
+    const double d = ijk.asVec3d().length() - 10;
+    if (std::abs(d) < 3) {
+      grid->tree().setValueOn(ijk, static_cast<float>(d));
+    } else if (d < 0) {
+      grid->tree().setValueOff(ijk, -3);
+    }
+  }
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  return grid;
+}
+
+openvdb::math::Transform::Ptr fifths() {
+  return openvdb::math::Transform::createLinearTransform(0.2);
+}
+
+TEST_F(ResampleTest, VoxelsOfPicoGkAreAsLargeAsItsMetadataSays) {
+  const auto ball = ballInVoxels();
+  ball->insertMeta("PicoGK.VoxelSize", openvdb::FloatMetadata(0.0002F));
+  for (const std::vector<std::string>& unit : {std::vector<std::string>{}, {"--unit", "m"}}) {
+    std::vector<std::string> arguments{write({{"PicoGK.Voxels.0", ball}})};
+    arguments.insert(arguments.end(), unit.begin(), unit.end());
+    const Made of_picogk = made(arguments);
+    EXPECT_NEAR(of_picogk.mm3, ball_mm3, near_mm3);
+    EXPECT_THAT(
+        of_picogk.warnings,
+        ElementsAre("grid 'PicoGK.Voxels.0' comes from PicoGK: its voxels are 0.2 mm, as its "
+                    "metadata says"));
+  }
+  EXPECT_NEAR(made({write({{"a", ball}}), "--scale", "0.5"}).mm3, ball_mm3 / 8, near_mm3 / 4);
+  const auto nonsense = ballInVoxels();
+  nonsense->insertMeta("PicoGK.VoxelSize", openvdb::StringMetadata("0.2 mm"));
+  EXPECT_THAT(made({write({{"a", nonsense}}), "--scale", "0.2"}).warnings,
+              ElementsAre(HasSubstr("its metadata PicoGK.VoxelSize is no length in metres")));
+  // A transform that says something is believed.
+  ball->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
+  EXPECT_NEAR(made({write({{"a", ball}})}).mm3, ball_mm3 / 8, near_mm3 / 4);
+}
+
+TEST_F(ResampleTest, ALevelSetThatWasNeverFilledIsFilled) {
+  const auto ball = ballInVoxels();
+  ball->setTransform(fifths());
+  EXPECT_NEAR(made({write({{"a", ball}})}).mm3, ball_mm3, near_mm3);
+  EXPECT_THAT(made({write({{"a", ball}})}).warnings, IsEmpty());
+  for (auto value = ball->beginValueOff(); value; ++value) {
+    if (*value < 0) value.setValue(3);
+  }
+  const Made filled = made({write({{"a", ball}})});
+  EXPECT_NEAR(filled.mm3, ball_mm3, near_mm3);
+  EXPECT_THAT(filled.warnings,
+              ElementsAre("grid 'a' has its inside at +background, as if it were "
+                          "hollow; its surface is closed, and the inside is filled"));
+  for (const Coord& ijk : CoordBBox(Coord(4, -2, -2), Coord(14, 2, 2)))
+    ball->tree().setValueOff(ijk, 3);
+  EXPECT_THAT(
+      planning({{"a", ball}}),
+      ThrowsMessage<DataError>(
+          AllOf(HasSubstr("grid 'a' is a level set with its inside at +background, and its surface "
+                          "is open at voxel "),
+                HasSubstr("; close the surface, or fill the signs (signed flood fill) in the tool "
+                          "that it comes from"))));
+}
+
+TEST_F(ResampleTest, GridsThatAreNotUsedAreNamed) {
+  const auto ball = ballInVoxels();
+  ball->setTransform(fifths());
+  ball->setName("surface");
+  openvdb::io::File(path.string()).write(openvdb::GridCPtrVec{ball, ball->deepCopy()});
+  const Made one = made({path.string()});
+  EXPECT_NEAR(one.mm3, ball_mm3, near_mm3);
+  EXPECT_THAT(
+      one.warnings,
+      ElementsAre("only grid 'surface' is used, not 'surface_2' (float); 'surface_2' is a "
+                  "second grid of that name; csg --union joins what resample makes of each"));
+  EXPECT_THAT(made({write({{"a", ball}, {"v", openvdb::Vec3SGrid::create()}})}).warnings,
+              ElementsAre("only grid 'a' is used, not 'v' (vec3s)"));
+}
+
+template <typename GridT>
+GridConstPtr voxelsOfBall(typename GridT::ValueType value) {
+  const auto grid = GridT::create();
+  for (const Coord& ijk : CoordBBox(Coord(-14), Coord(14))) {
+    if (ijk.asVec3d().length() < 10) grid->tree().setValueOn(ijk, value);
+  }
+  grid->setTransform(fifths());
+  return grid;
+}
+
+TEST_F(ResampleTest, VoxelsAreReadAsTheyAre) {
+  for (const GridConstPtr& grid :
+       {voxelsOfBall<openvdb::BoolGrid>(true), voxelsOfBall<openvdb::MaskGrid>(true),
+        voxelsOfBall<openvdb::Int32Grid>(-7), voxelsOfBall<openvdb::Int64Grid>(1)}) {
+    const Made ball = made({write({{"mask", grid}})});
+    EXPECT_NEAR(ball.mm3, ball_mm3, near_mm3) << grid->valueType();
+    EXPECT_THAT(ball.warnings, IsEmpty()) << grid->valueType();
+  }
+  const auto labels = openvdb::Int32Grid::create(0);
+  labels->sparseFill(CoordBBox(Coord(0), Coord(9)), 0);
+  labels->sparseFill(CoordBBox(Coord(0), Coord(4, 9, 9)), 3);
+  labels->setTransform(fifths());
+  EXPECT_NEAR(made({write({{"labels", labels}})}).mm3, 4, 0.1);
+  EXPECT_THAT(planning({{"mask", voxelsOfBall<openvdb::BoolGrid>(true)}}, {"--kind", "level-set"}),
+              ThrowsMessage<UsageError>("--kind: grid 'mask' holds voxels and no distances"));
+  EXPECT_THAT(planning({{"mask", openvdb::BoolGrid::create(false)}}),
+              ThrowsMessage<DataError>(HasSubstr("grid 'mask' has no surface")));
+}
+
+TEST_F(ResampleTest, SizesThatNobodyMeansAreAskedAbout) {
+  const auto ball = ballInVoxels();
+  ball->setTransform(openvdb::math::Transform::createLinearTransform(0.0002));
+  EXPECT_THAT(
+      made({write({{"a", ball}})}).warnings,
+      ElementsAre("the part is 0.004 x 0.004 x 0.004 mm; are the file's numbers m? --unit m "
+                  "makes its longest side 3.99 mm"));
+  ball->setTransform(openvdb::math::Transform::createLinearTransform(0.04));
+  EXPECT_THAT(
+      made({write({{"a", ball}})}).warnings,
+      ElementsAre("the part is 0.798 x 0.798 x 0.798 mm, fewer than 10 voxels along its "
+                  "longest side; are the file's numbers in? --unit in makes its longest side "
+                  "20.27 mm"));
+}
+
+FloatGrid::Ptr fogOfBall(double ramp_voxels, double greatest) {
+  const auto fog = FloatGrid::create(0);
+  for (const Coord& ijk : CoordBBox(Coord(-20), Coord(20))) {
+    const double depth = 10 - ijk.asVec3d().length();
+    if (depth > 0)
+      fog->tree().setValueOn(
+          ijk, static_cast<float>(greatest * std::clamp(depth / ramp_voxels, 0.0, 1.0)));
+  }
+  fog->setGridClass(openvdb::GRID_FOG_VOLUME);
+  fog->setTransform(fifths());
+  return fog;
+}
+
+TEST_F(ResampleTest, FogWhoseLevelLiesFarInsideIsAskedAbout) {
+  EXPECT_THAT(made({write({{"fog", fogOfBall(1, 1)}})}).warnings, IsEmpty());
+  const Made ramp = made({write({{"fog", fogOfBall(4, 1)}})});
+  EXPECT_THAT(
+      ramp.warnings,
+      ElementsAre(AllOf(HasSubstr("grid 'fog' is fog of values up to 1, which begins about "),
+                        HasSubstr(" of its voxels, outside its surface at 0.5; if it is solid "
+                                  "where it begins, give --level 0.01"))));
+  const Made whole = made({write({{"fog", fogOfBall(4, 1)}}), "--level", "0.01"});
+  // Between its first voxel and the one before it, the fog may begin anywhere.
+  EXPECT_NEAR(whole.mm3, ball_mm3, 3);
+  EXPECT_LT(ramp.mm3, 0.7 * ball_mm3);
+  EXPECT_THAT(whole.warnings, IsEmpty());
+  EXPECT_THAT(made({write({{"fog", fogOfBall(1, 100)}})}).warnings,
+              ElementsAre("grid 'fog' is fog of values up to 100, and its surface is taken at 0.5; "
+                          "--level 50 is half of that"));
 }
 
 }  // namespace

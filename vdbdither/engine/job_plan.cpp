@@ -6,9 +6,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/options.h"
 #include "vdbdither/engine/run_options.h"
 #include "vdbdither/engine/version.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -45,8 +47,8 @@ std::string stageText(const StagePlan& stage) {
   if (stage.memory_bytes > 0) text += ", holds " + bytesText(stage.memory_bytes);
   text += '\n';
   for (const InputPlan& input : stage.inputs) {
-    text += "input     " + (input.path == "-" ? "standard input" : input.path) + " for " +
-            stage.name + ", a " + (input.is_pipe ? "pipe" : "file") + " of " +
+    text += "input     " + (input.path == "-" ? "standard input" : printable(input.path)) +
+            " for " + stage.name + ", a " + (input.is_pipe ? "pipe" : "file") + " of " +
             std::to_string(input.layers.size()) + " layers\n";
   }
   return text;
@@ -163,7 +165,7 @@ std::string toText(const JobPlan& plan) {
     const OutputEstimate& output = stage.output;
     if (!isFile(output)) continue;
     text << "disk      " << (output.bytes > 0 ? "about " + bytesText(output.bytes) : "unknown")
-         << " of " << bytesText(stage.free_disk_bytes) << " for " << output.path << "\n";
+         << " of " << bytesText(stage.free_disk_bytes) << " for " << printable(output.path) << "\n";
   }
   return text.str();
 }
@@ -180,7 +182,7 @@ std::string toJson(const JobPlan& plan) {
                      {"memory_limit_bytes", known(plan.memory_limit_bytes)},
                      {"stages", ordered_json::array()}};
   for (const StagePlan& stage : plan.stages) entry["stages"].push_back(json(stage, all.begin));
-  return entry.dump() + "\n";
+  return jsonText(entry) + "\n";
 }
 
 }  // namespace vdbdither

@@ -11,6 +11,7 @@
 #include "vdbdither/engine/verb.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
+#include "vdbdither/model/unexpected.h"
 
 namespace vdbdither {
 
@@ -61,8 +62,10 @@ auto callNamed(const std::string& verb, const Function& function) {
     throw UsageError(verb + ": " + error.what());
   } catch (const std::bad_alloc&) {
     throw DataError(verb + ": out of memory; try a smaller --slab or fewer layers");
-  } catch (const std::exception& error) {
+  } catch (const Error& error) {
     throw DataError(verb + ": " + error.what());
+  } catch (const std::exception& error) {
+    throw DataError(verb + ": " + unexpectedText(error));
   }
 }
 

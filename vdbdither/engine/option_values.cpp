@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -68,20 +69,10 @@ std::string boundText(double bound) {
   return is_short ? std::to_string(static_cast<long>(bound)) : shortestText(bound);
 }
 
-bool isControl(char c) { return std::iscntrl(static_cast<unsigned char>(c)) != 0; }
-
 std::string escaped(std::string_view word) {
-  constexpr std::string_view digits = "0123456789abcdef";
-  std::string text = "$'";
-  for (const char c : word) {
-    if (isControl(c)) {
-      const auto byte = static_cast<unsigned char>(c);
-      text.append("\\x").append(1, digits[byte >> 4]).append(1, digits[byte & 15]);
-    } else {
-      text.append(c == '\\' || c == '\'' ? "\\" : "").append(1, c);
-    }
-  }
-  return text + "'";
+  std::string text;
+  for (const char c : word) text.append(c == '\\' || c == '\'' ? "\\" : "").append(1, c);
+  return "$'" + printable(text) + "'";
 }
 
 }  // namespace
@@ -132,7 +123,7 @@ std::string quotedForShell(std::string_view word) {
     return std::isalnum(static_cast<unsigned char>(c)) || plain_signs.find(c) != plain_signs.npos;
   };
   if (!word.empty() && std::all_of(word.begin(), word.end(), isPlain)) return std::string(word);
-  if (std::any_of(word.begin(), word.end(), isControl)) return escaped(word);
+  if (!isPrintable(word)) return escaped(word);
   std::string text = "'";
   for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return text + "'";

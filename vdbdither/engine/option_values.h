@@ -37,7 +37,7 @@ double parseLengthMm(std::string_view text, const Range& range = {});
 std::string shortestText(double value);
 
 /// Returns `word` as a shell and splitWords read it: unchanged if it is plain, otherwise in quotes,
-/// with control characters as escapes, so that the result is always a single line.
+/// with what is not printable as escapes, so that the result is always a single line of UTF-8.
 std::string quotedForShell(std::string_view word);
 
 /// The candidate nearest to `word` by edit distance, or an empty text where none is near.

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "io/file/standard_streams.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -41,7 +42,7 @@ void Console::begin(bool quiet, double box_voxels, double expected_seconds) {
 
 void Console::warn(const std::string& verb, const std::string& text) {
   clear();
-  std::fprintf(stderr, "vdbdither %s: warning: %s\n", verb.c_str(), text.c_str());
+  std::fprintf(stderr, "vdbdither %s: warning: %s\n", verb.c_str(), printable(text).c_str());
 }
 
 void Console::progress(const std::string& verb, int done, int total, double fraction) {
@@ -64,7 +65,7 @@ void Console::progress(const std::string& verb, int done, int total, double frac
 void Console::print(const std::string& text) {
   clear();
   if (results_to_error_) {
-    std::fputs(text.c_str(), stderr);
+    std::fputs(printableLines(text).c_str(), stderr);
   } else {
     printData(text.c_str());
   }

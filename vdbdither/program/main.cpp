@@ -12,6 +12,7 @@
 #include "io/file/standard_streams.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/chain.h"
+#include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/manual.h"
 #include "vdbdither/engine/named_file.h"
 #include "vdbdither/engine/pipeline.h"
@@ -20,6 +21,8 @@
 #include "vdbdither/engine/version.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
+#include "vdbdither/model/printable.h"
+#include "vdbdither/model/unexpected.h"
 #include "vdbdither/program/console.h"
 #include "vdbdither/program/ending.h"
 #include "vdbdither/program/threads.h"
@@ -85,7 +88,7 @@ std::string reportJson(const JobReport& report, double seconds) {
     for (const auto& [name, value] : stage.counts) entry["counts"][name] = value;
     json["stages"].push_back(entry);
   }
-  return json.dump() + "\n";
+  return jsonText(json) + "\n";
 }
 
 void printStages(const JobReport& report, double seconds) {
@@ -94,7 +97,7 @@ void printStages(const JobReport& report, double seconds) {
                  stage.seconds, stage.active_voxels, bytesText(stage.bytes).c_str(),
                  bytesText(stage.peak_memory_bytes).c_str());
     for (const auto& [name, value] : stage.counts) {
-      std::fprintf(stderr, "  %s %s", name.c_str(), shortestText(value).c_str());
+      std::fprintf(stderr, "  %s %s", printable(name).c_str(), shortestText(value).c_str());
     }
     std::fputc('\n', stderr);
   }
@@ -178,9 +181,10 @@ bool namesItsVerb(const std::string& message) {
 }
 
 int guardedMain(int argc, char** argv) {
-  const auto fail = [](const char* message, int code) {
+  const auto fail = [](const std::string& message, int code) {
     claimEnding(code);
-    std::fprintf(stderr, "vdbdither%s %s\n", namesItsVerb(message) ? "" : ":", message);
+    std::fprintf(stderr, "vdbdither%s %s\n", namesItsVerb(message) ? "" : ":",
+                 printable(message).c_str());
     return code;
   };
   // The next slab needs what one slab frees: returning it to the system in between doubles the
@@ -189,6 +193,8 @@ int guardedMain(int argc, char** argv) {
   try {
     openStandardDescriptors();
     setStandardOutputAside();
+    // Libraries write warnings there, in their own words.
+    std::cerr.rdbuf(nullptr);
     noteInterrupts();
     initializeVdb();
     runProgram(argc, argv);
@@ -202,8 +208,10 @@ int guardedMain(int argc, char** argv) {
     return fail(error.what(), 2);
   } catch (const std::bad_alloc&) {
     return fail("out of memory; try a smaller --slab or fewer --layers", 1);
-  } catch (const std::exception& error) {
+  } catch (const Error& error) {
     return fail(error.what(), 1);
+  } catch (const std::exception& error) {
+    return fail(unexpectedText(error), 1);
   }
 }
 

@@ -34,6 +34,33 @@ TEST(MaterialTable, BrokenJsonIsADataError) {
   }
 }
 
+TEST(MaterialTable, ColoursOutOfRangeAndDeepTextsAreDataErrors) {
+  for (const std::string& text :
+       {std::string(R"([{"index":1,"name":"a","rgba":[0,0,0,256]}])"),
+        std::string(R"([{"index":1,"name":"a","rgba":[0,0,-1,0]}])"),
+        std::string(R"([{"index":1,"name":"a","rgba":[0,0,0.5,0]}])"),
+        std::string(R"([{"index":1,"name":7,"rgba":[0,0,0,0]}])"), std::string("[7]"),
+        std::string("{}"), std::string(1000000, '[')}) {
+    EXPECT_THAT([&] { materialTableFromJson(text); },
+                ThrowsMessage<DataError>(HasSubstr("; assign the materials again")))
+        << text.substr(0, 80);
+  }
+}
+
+TEST(MaterialTable, NamesBecomePrintable) {
+  EXPECT_EQ(materialTableFromJson(R"([{"index":1,"name":"a\n\u001b","rgba":[0,0,0,0]}])")[0].name,
+            "a\\n\\x1b");
+}
+
+TEST(MaterialTable, ANameThatIsNoFolderIsADataError) {
+  for (const char* name : {"", ".", "..", "../a", "a/b", "/a", ".hidden"}) {
+    const std::string text =
+        R"([{"index":1,"name":")" + std::string(name) + R"(","rgba":[0,0,0,0]}])";
+    EXPECT_THAT([&] { materialTableFromJson(text); },
+                ThrowsMessage<DataError>(HasSubstr("' cannot be the name of a folder")));
+  }
+}
+
 TEST(MaterialTable, NamesAreThePrintersThenTheUsualInks) {
   const std::vector<Material> known = {{"Blue", {1, 2, 3, 255}}, {"white", {9, 9, 9, 255}}};
   EXPECT_THAT(parseMaterial("blue", known).rgba, ElementsAre(1, 2, 3, 255));

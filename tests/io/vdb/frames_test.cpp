@@ -1,10 +1,12 @@
 #include "io/vdb/frames.h"
 
+#include <cmath>
 #include <csignal>
 #include <random>
 #include <sys/mman.h>
 #include <thread>
 #include <unistd.h>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -35,8 +37,9 @@ Slab slabOf(const Schema& schema, ZRange core) {
 }
 
 /// What a writer puts on a pipe for slabs of eight layers.
-std::string recorded() {
-  const Schema schema = schemaOfSample();
+std::string recorded(const std::string& history = "mesh2sdf part.stl") {
+  Schema schema = schemaOfSample();
+  schema.metadata["vdbdither:history"] = history;
   const int file = ::memfd_create("frames", 0);
   FrameWriter writer(file);
   writer.head(schema);
@@ -112,10 +115,107 @@ TEST_F(Frames, AMissingSlabIsAnError) {
   const std::size_t third = bytes.find(" BDV", second + 4);
   ASSERT_NE(third, std::string::npos);
   EXPECT_EQ(outcome(bytes.substr(0, second) + bytes.substr(third)),
-            "the pipe has a frame out of place: 'end 32'");
+            "the pipe has a frame out of place: 'end 32'; make it again");
   EXPECT_EQ(outcome(bytes.substr(second)), "the pipe does not begin with a head frame");
   EXPECT_EQ(outcome(bytes.substr(0, third)),
             "the pipe ended before its closing frame: the run upstream failed or was stopped");
+}
+
+/// Where the archives of `bytes` begin.
+std::vector<std::size_t> beginnings(const std::string& bytes) {
+  std::vector<std::size_t> found;
+  for (std::size_t at = bytes.find(" BDV"); at != std::string::npos;
+       at = bytes.find(" BDV", at + 4))
+    found.push_back(at);
+  return found;
+}
+
+TEST_F(Frames, FramesOfAnotherRunAreRefused) {
+  const std::string mixed =
+      "the pipe mixes the frames of two runs; give each run a pipe of its own, "
+      "and combine what they make by csg";
+  const std::string ours = recorded();
+  const std::string others = recorded("mesh2sdf other.stl");
+  const std::vector<std::size_t> a = beginnings(ours);
+  const std::vector<std::size_t> b = beginnings(others);
+  ASSERT_EQ(a.size(), 6U);
+  ASSERT_EQ(b.size(), 6U);
+  // Each frame in turn is replaced by that of the other run, which fits otherwise.
+  for (std::size_t frame = 1; frame < 6; ++frame) {
+    const std::string replaced =
+        others.substr(b[frame], frame < 5 ? b[frame + 1] - b[frame] : others.npos);
+    const std::string rest = frame < 5 ? ours.substr(a[frame + 1]) : "";
+    EXPECT_EQ(outcome(ours.substr(0, a[frame]) + replaced + rest), mixed) << frame;
+  }
+  EXPECT_EQ(outcome(ours.substr(0, a[1]) + others + ours.substr(a[1])), mixed);
+  EXPECT_EQ(outcome(ours.substr(0, a[3]) + others.substr(0, b[1]) + ours.substr(a[3])), mixed);
+  // Two runs of one command line begin alike.
+  EXPECT_EQ(outcome(ours.substr(0, a[1]) + ours), mixed);
+}
+
+TEST_F(Frames, TheIdOfARunDependsOnItAlone) {
+  EXPECT_EQ(recorded(), recorded());
+  EXPECT_NE(recorded(), recorded("mesh2sdf other.stl"));
+}
+
+TEST_F(Frames, ADoubledOrSwappedSlabIsOutOfPlace) {
+  const std::string bytes = recorded();
+  const std::vector<std::size_t> at = beginnings(bytes);
+  const auto frame = [&](std::size_t n) { return bytes.substr(at[n], at[n + 1] - at[n]); };
+  EXPECT_EQ(outcome(frame(0) + frame(1) + frame(1) + frame(2) + frame(3) + frame(4) +
+                    bytes.substr(at[5])),
+            "the pipe has a frame out of place: 'slab -8 0'; make it again");
+  EXPECT_EQ(outcome(frame(0) + frame(2) + frame(1) + frame(3) + frame(4) + bytes.substr(at[5])),
+            "the pipe has a frame out of place: 'slab -8 0'; make it again");
+}
+
+TEST_F(Frames, WhatFollowsTheClosingFrameIsRefused) {
+  const std::string bytes = recorded();
+  EXPECT_EQ(outcome(bytes + bytes),
+            "the pipe goes on behind its closing frame: another archive follows; pipe in one run "
+            "or one file at a time");
+  EXPECT_EQ(outcome(bytes + "\n"),
+            "the pipe goes on behind its closing frame: 1 byte follows; pipe in one run or one "
+            "file at a time");
+  EXPECT_EQ(outcome(bytes + std::string(3 << 20, 'x')),
+            "the pipe goes on behind its closing frame: 3145728 bytes follow; pipe in one run or "
+            "one file at a time");
+}
+
+TEST_F(Frames, WhatFollowsASingleArchiveIsRefused) {
+  const Schema schema = schemaOfSample();
+  const std::string archive = archiveBytes({slabOf(schema, {0, 8}).grids, {}}, VdbCodec::none);
+  EXPECT_EQ(outcome(archive + archive),
+            "the pipe goes on behind its archive: another archive follows; pipe in one run or one "
+            "file at a time");
+  EXPECT_EQ(outcome(archive + recorded()),
+            "the pipe goes on behind its archive: another archive follows; pipe in one run or one "
+            "file at a time");
+  EXPECT_EQ(outcome(archive + "12"),
+            "the pipe goes on behind its archive: 2 bytes follow; pipe in one run or one file at a "
+            "time");
+}
+
+TEST_F(Frames, GridsAreCheckedAsTheyCome) {
+  const Schema schema = schemaOfSample();
+  Grids grids = slabOf(schema, {0, 8}).grids;
+  openvdb::gridPtrCast<openvdb::FloatGrid>(
+      std::const_pointer_cast<openvdb::GridBase>(grids.at("surface")))
+      ->tree()
+      .setValue({1, 3, 5}, std::nanf(""));
+  const std::string refused =
+      "the pipe: grid 'surface' holds nan at voxel 1 3 5, which is not a finite number; mend it in "
+      "the tool that it comes from";
+  EXPECT_EQ(outcome(archiveBytes({grids, {}}, VdbCodec::none)), refused);
+  const int file = ::memfd_create("frames", 0);
+  FrameWriter writer(file);
+  writer.head(schema);
+  writer.slab({{0, 8}, {0, 8}, grids});
+  writer.end();
+  std::string bytes(::lseek(file, 0, SEEK_END), 0);
+  EXPECT_EQ(::pread(file, bytes.data(), bytes.size(), 0), static_cast<ssize_t>(bytes.size()));
+  ::close(file);
+  EXPECT_EQ(outcome(bytes), refused);
 }
 
 TEST_F(Frames, AFlippedByteIsFound) {
@@ -173,7 +273,8 @@ TEST_F(Frames, TheWholeIsRefusedWherePartOfItIsMissingOrMoreFollows) {
   const std::string archive =
       archiveBytes(contentsOf(schema, slabOf(schema, {-8, 24}).grids), VdbCodec::none);
   EXPECT_EQ(wholeOf(archive + archive),
-            "the pipe goes on behind its archive; pipe in one file at a time");
+            "the pipe goes on behind its archive: another archive follows; pipe in one run or one "
+            "file at a time");
 }
 
 TEST_F(Frames, AnArchiveOfAnotherToolIsOneSlab) {

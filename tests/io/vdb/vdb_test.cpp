@@ -145,6 +145,13 @@ TEST_F(Vdb, AFileOfAnotherToolHasTheBoxOfItsVoxels) {
             openvdb::CoordBBox({-8, -8, -8}, {7, 7, 7}));
 }
 
+TEST_F(Vdb, AFileIsNoFrameOfAPipe) {
+  VdbContents contents = sample();
+  contents.metadata["vdbdither:frame"] = "head";
+  contents.metadata["vdbdither:run"] = "x";
+  EXPECT_EQ(schemaOf(contents, "it").metadata.size(), 1U);
+}
+
 TEST_F(Vdb, TurnedAndUnlikeGridsAreRefused) {
   VdbContents contents = sample();
   const auto turned = openvdb::FloatGrid::create(1);
@@ -154,13 +161,54 @@ TEST_F(Vdb, TurnedAndUnlikeGridsAreRefused) {
       refusal([&] {
         schemaOf({{{"t", turned}}, {}}, "it");
       }),
-      "it: grid 't' is turned or sheared; resample --grid t brings numbers onto the printer's "
+      "it: grid 't' is turned, mirrored or sheared; resample --grid t brings it onto the printer's "
       "lattice");
   const auto cubes = openvdb::FloatGrid::create(1);
   contents.grids["cubes"] = cubes;
   EXPECT_NE(refusal([&] { schemaOf(contents, "it"); }).find("lie on different lattices"),
             std::string::npos);
   EXPECT_EQ(refusal([&] { schemaOf({}, "it"); }), "it holds no grid");
+}
+
+TEST_F(Vdb, AGridOfPicoGkIsLeftToResample) {
+  const auto grid = openvdb::FloatGrid::create(3);
+  grid->setName("ball");
+  EXPECT_TRUE(latticeOf(*grid));
+  grid->insertMeta("PicoGK.VoxelSize", openvdb::FloatMetadata(0.0002F));
+  EXPECT_EQ(picoGkVoxelMm(*grid), 0.2);
+  EXPECT_FALSE(latticeOf(*grid));
+  EXPECT_EQ(
+      refusal([&] {
+        schemaOf({{{"ball", grid}}, {}}, "it");
+      }),
+      "it: grid 'ball' comes from PicoGK, with an identity as its transform and voxels of 0.2 mm "
+      "in its metadata, which resample --grid ball honours");
+  grid->insertMeta("PicoGK.VoxelSize", openvdb::FloatMetadata(0));
+  EXPECT_FALSE(picoGkVoxelMm(*grid));
+  grid->insertMeta("PicoGK.VoxelSize", openvdb::FloatMetadata(0.0002F));
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(0.2));
+  EXPECT_FALSE(picoGkVoxelMm(*grid));
+}
+
+TEST_F(Vdb, BoxesThatCannotBeCountedAreRefused) {
+  VdbContents contents = sample();
+  for (const char* box : {"0 0 0 1 1", "a", "0 0 0 1 1 2147483647", "-2000000000 0 0 1 1 1"}) {
+    contents.metadata["vdbdither:box"] = box;
+    EXPECT_NE(
+        refusal([&] { schemaOf(contents, "it"); }).find("is not six whole numbers from -2^30"),
+        std::string::npos)
+        << box;
+  }
+  contents.metadata["vdbdither:box"] = "0 0 -500000000 1 1 500000000";
+  EXPECT_EQ(refusal([&] { schemaOf(contents, "it"); }),
+            "it has 1000000001 layers, and at most 10000000 are processed; check its box and its "
+            "grids");
+  const auto far = openvdb::FloatGrid::create(1);
+  far->tree().setValue({0, 0, 2147483000}, 0);
+  EXPECT_NE(refusal([&] {
+              schemaOf({{{"far", far}}, {}}, "it");
+            }).find("voxels beyond index 2^30"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json_fwd.hpp>
+
+namespace vdbdither {
+
+/// Returns `json` as text: on one line, or with `indent` blanks for each level. All JSON of the
+/// program is written here.
+///
+/// The text is valid UTF-8 and has no effect on a terminal: bytes in keys and strings that are not
+/// UTF-8 become `\xNN` (as characters of the string), and characters that are not printable are
+/// written as JSON escapes.
+std::string jsonText(nlohmann::ordered_json json, int indent = -1);
+
+/// Returns the JSON that `text` holds. The value is discarded (`is_discarded()`) if the text is not
+/// JSON, or nests deeper than 100 levels, which functions that follow the levels could not bear.
+nlohmann::ordered_json parsedJson(std::string_view text);
+
+}  // namespace vdbdither
