@@ -8,6 +8,7 @@
 #include <optional>
 #include <sys/syscall.h>
 #include <sys/wait.h>
+#include <thread>
 #include <unistd.h>
 
 #include <gmock/gmock.h>
@@ -379,6 +380,42 @@ TEST(StagedOutput, WritesBelowItsFolderOnlyAndEachFileOnce) {
   fs::create_symlink(scratch / "victim", output.path() / "link");
   EXPECT_THAT(writing("link"), ThrowsMessage<DataError>(shown + "/link': File exists"));
   EXPECT_EQ(namesIn(scratch.path()).size(), 1U);
+}
+
+TEST(StagedOutput, RemovesWhatBelongsToAPartialOutputOfAKilledRun) {
+  const test::ScratchFolder scratch;
+  const pid_t dead = fork();
+  if (dead == 0) _exit(0);
+  int status = 0;
+  waitpid(dead, &status, 0);
+  for (const std::string name : {"", ".old", "-faces"})
+    put(scratch / (".out.partial-" + std::to_string(dead) + name), one);
+  StagedOutput(scratch / "out", Kind::file);
+  EXPECT_THAT(test::filesUnder(scratch.path()), IsEmpty());
+}
+
+TEST(StagedOutput, AfterAbandonAllNothingRemainsAndNothingIsCommitted) {
+  const test::ScratchFolder scratch;
+  put(scratch / "old", one);
+  // A process of its own, for no output can be committed in it afterwards.
+  const pid_t child = fork();
+  if (child == 0) {
+    StagedOutput folder(scratch / "out", Kind::folder);
+    folder.write("deep/er/a", one);
+    StagedOutput file(scratch / "old", Kind::file);
+    put(file.path(), two);
+    StagedOutput unwritten(scratch / "new", Kind::file);
+    StagedOutput::abandonAll(std::chrono::milliseconds(100));
+    std::thread([&] { folder.write("deep/er/b", one); }).detach();
+    std::thread([&] { file.commit(); }).detach();
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  EXPECT_THAT(test::filesUnder(scratch.path()), UnorderedElementsAre(Pair("old", one)));
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), {}), 1);
 }
 
 TEST(StagedOutput, RefusesBeforeAnyWork) {
