@@ -86,7 +86,7 @@ class RecordLayouts {
   }
 
   [[nodiscard]] std::vector<RecordLayout> all() {
-    if (announced_ == held_ && fills_file_) {
+    if (announced_ == held_ && (fills_file_ || held_ == 0)) {
       return {{.blocks = {{0, held_}}, .adds_up = true, .end = size_}};
     }
     std::vector<RecordLayout> layouts;

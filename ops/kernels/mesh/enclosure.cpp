@@ -100,8 +100,14 @@ double shareOf(const Mesh& given, const Mesh& mesh) {
 }  // namespace
 
 std::string whyFlat(const Mesh& mesh) {
-  if (mesh.triangles.size() < 4)
-    return "it has only " + counted(mesh.triangles.size(), "triangle") + ", and 4 are needed";
+  const auto count = std::count_if(
+      mesh.triangles.begin(), mesh.triangles.end(), [&](const Mesh::Triangle& t) {
+        const Vec3d& corner = mesh.vertices[t[0]];
+        return !(mesh.vertices[t[1]] - corner).cross(mesh.vertices[t[2]] - corner).isZero();
+      });
+  if (count < 4)
+    return "it has only " + counted(static_cast<std::size_t>(count), "triangle") +
+           " with an area, and 4 are needed";
   constexpr double open = 0x1p-22;  // of the largest coordinate
   const auto farthest = [&](const auto& distance) {
     return *std::max_element(

@@ -7,8 +7,8 @@
 
 namespace vdbdither {
 
-/// Returns why triangles cannot bound a volume, in the words of a message: there are fewer than
-/// four, or all their corners lie in one plane, to the rounding of single precision. Empty where
+/// Returns why triangles cannot bound a volume, in the words of a message: fewer than four have an
+/// area, or all their corners lie in one plane, to the rounding of single precision. Empty where
 /// they may.
 std::string whyFlat(const Mesh& mesh);
 

@@ -92,7 +92,13 @@ SolidBodies solidBodies(std::vector<Mesh> bodies, const SolidOptions& options) {
   for (Mesh& body : bodies) {
     DerivedMesh triangles = derived(std::move(body), first);
     first += static_cast<std::uint32_t>(triangles.source.size());
-    SolidMesh& solid = made.bodies.emplace_back(closed(triangles, options));
+    SolidMesh& solid = made.bodies.emplace_back();
+    try {
+      solid = closed(triangles, options);
+    } catch (const DataError& error) {
+      throw DataError("mesh " + std::to_string(made.bodies.size()) + " of " +
+                      std::to_string(bodies.size()) + ": " + error.what());
+    }
     if (solid.report.is_guess) {
       guesses.push_back({solid.mesh, solid.source});
       report.repairs.degenerate_triangles += solid.report.repairs.degenerate_triangles;

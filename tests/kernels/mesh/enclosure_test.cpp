@@ -148,15 +148,16 @@ TEST(WhyFlat, TellsWhyTrianglesCannotBoundAVolume) {
   EXPECT_EQ(whyFlat(waves()), "");
   Mesh few = boxMesh({0, 0, 0}, {1, 1, 1});
   few.triangles.resize(3);
-  EXPECT_EQ(whyFlat(few), "it has only 3 triangles, and 4 are needed");
+  EXPECT_EQ(whyFlat(few), "it has only 3 triangles with an area, and 4 are needed");
   few.triangles.resize(1);
-  EXPECT_EQ(whyFlat(few), "it has only 1 triangle, and 4 are needed");
+  EXPECT_EQ(whyFlat(few), "it has only 1 triangle with an area, and 4 are needed");
   const auto flat = [](const std::function<Vec3d(double, double)>& at) {
     Mesh mesh = sheet(9, 9, at);
     for (Vec3d& vertex : mesh.vertices) vertex = Vec3d(openvdb::Vec3s(vertex));
     return whyFlat(mesh);
   };
-  EXPECT_EQ(flat([](double, double) { return Vec3d(1, 2, 3); }), "all its corners lie in one point");
+  EXPECT_EQ(flat([](double, double) { return Vec3d(1, 2, 3); }),
+            "it has only 0 triangles with an area, and 4 are needed");
   EXPECT_EQ(flat([](double u, double v) { return Vec3d(u + v, 0.3 * (u + v), 7); }),
             "all its corners lie in one line");
   for (const double far : {0.0, 1.0, 1000.0})
