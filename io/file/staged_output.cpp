@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 
@@ -155,6 +156,7 @@ void StagedOutput::write(const fs::path& name, std::span<const std::uint8_t> byt
 }
 
 void StagedOutput::commit() {
+  throwIfInterrupted();
   const std::shared_lock naming(Unfinished::all().naming);
   // An exchange keeps a whole output in place all the time; where the file system has none, or
   // there is nothing to replace, the rename does.

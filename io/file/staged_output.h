@@ -32,7 +32,7 @@ class StagedOutput {
   void write(const std::filesystem::path& name, std::span<const std::uint8_t> bytes) const;
 
   /// Gives it its name, in place of what had it before: at every moment the old one or the new one
-  /// is there, whole.
+  /// is there, whole. Throws Interrupted if the run is to stop.
   void commit();
 
   /// Removes all outputs of the process that are not committed, and lets none be committed or

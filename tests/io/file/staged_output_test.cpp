@@ -1,5 +1,6 @@
 #include "io/file/staged_output.h"
 
+#include <csignal>
 #include <fstream>
 #include <optional>
 #include <thread>
@@ -10,6 +11,7 @@
 
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 namespace {
@@ -101,6 +103,28 @@ TEST(StagedOutput, RemovesWhatBelongsToAPartialOutputOfAKilledRun) {
   for (const std::string name : {"", ".old", "-faces"})
     put(scratch / (".out.partial-" + std::to_string(dead) + name), one);
   StagedOutput(scratch / "out", Kind::file);
+  EXPECT_THAT(test::filesUnder(scratch.path()), IsEmpty());
+}
+
+TEST(StagedOutput, IsNotCommittedAfterASignal) {
+  const test::ScratchFolder scratch;
+  const pid_t child = fork();
+  if (child == 0) {
+    noteInterrupts();
+    int code = 1;
+    try {
+      StagedOutput file(scratch / "new", Kind::file);
+      put(file.path(), two);
+      std::raise(SIGTERM);
+      file.commit();
+    } catch (const Interrupted& error) {
+      code = error.signal() == SIGTERM ? 0 : 2;
+    }
+    _exit(code);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
   EXPECT_THAT(test::filesUnder(scratch.path()), IsEmpty());
 }
 
