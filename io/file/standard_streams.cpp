@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
+#include <poll.h>
 #include <string>
 #include <unistd.h>
 
@@ -34,11 +35,22 @@ void setStandardOutputAside() {
 
 int dataOutput() { return data_descriptor; }
 
+void waitForOutput(int descriptor) {
+  // A signal may arrive just before the wait begins, or in another thread.
+  constexpr int look_again_milliseconds = 100;
+  pollfd wanted{descriptor, POLLOUT, 0};
+  int ready = 0;
+  do {
+    throwIfInterrupted();
+    ready = ::poll(&wanted, 1, look_again_milliseconds);
+  } while (ready == 0 || (ready < 0 && errno == EINTR));
+}
+
 void printData(const char* text) {
   for (std::size_t left = std::strlen(text); left > 0;) {
     const ssize_t count = ::write(data_descriptor, text, left);
-    if (count < 0 && errno == EINTR) {
-      throwIfInterrupted();
+    if (count < 0 && (errno == EINTR || errno == EAGAIN)) {
+      waitForOutput(data_descriptor);
       continue;
     }
     if (count < 0)

@@ -14,7 +14,10 @@ void setStandardOutputAside();
 /// The descriptor of the real standard output.
 int dataOutput();
 
-/// Writes all of `text` there. Throws DataError.
+/// Waits until a descriptor that does not block takes data again. Throws Interrupted.
+void waitForOutput(int descriptor);
+
+/// Writes all of `text` to the real standard output. Throws DataError.
 void printData(const char* text);
 
 }  // namespace vdbdither
