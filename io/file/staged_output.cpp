@@ -16,6 +16,7 @@
 #include "io/file/file_name.h"
 #include "io/file/staging_name.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 
@@ -305,6 +306,7 @@ void StagedOutput::write(const std::string& name, std::span<const std::uint8_t> 
 }
 
 void StagedOutput::commit() {
+  throwIfInterrupted();
   const std::shared_lock naming(Written::all().naming);
   if (kind_ == Kind::folder) {
     commitFolder();

@@ -52,8 +52,8 @@ class StagedOutput {
 
   /// Gives it its name, in place of what had it before: at every moment the old one or the new one
   /// is there, whole. (Where the file system cannot exchange folders, a run that is killed in this
-  /// moment leaves the old one for `putBack`.) Files that somebody else put into
-  /// the old folder since `checkFolder` stay in the folder.
+  /// moment leaves the old one for `putBack`.) Files that somebody else put into the old folder
+  /// since `checkFolder` stay in the folder. Throws Interrupted if the run is to stop.
   void commit();
 
   /// Removes all outputs of the process that are not committed, and lets none be committed or

@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
+#include <poll.h>
 #include <string>
 #include <unistd.h>
 
@@ -35,13 +36,24 @@ void setStandardOutputAside() {
 
 int dataOutput() { return data_descriptor; }
 
+void waitForOutput(int descriptor) {
+  // A signal may arrive just before the wait begins, or in another thread.
+  constexpr int look_again_milliseconds = 100;
+  pollfd wanted{descriptor, POLLOUT, 0};
+  int ready = 0;
+  do {
+    throwIfInterrupted();
+    ready = ::poll(&wanted, 1, look_again_milliseconds);
+  } while (ready == 0 || (ready < 0 && errno == EINTR));
+}
+
 void printData(const char* given) {
   const std::string shown = printableLines(given);
   const char* text = shown.data();
   for (std::size_t left = shown.size(); left > 0;) {
     const ssize_t count = ::write(data_descriptor, text, left);
-    if (count < 0 && errno == EINTR) {
-      throwIfInterrupted();
+    if (count < 0 && (errno == EINTR || errno == EAGAIN)) {
+      waitForOutput(data_descriptor);
       continue;
     }
     if (count < 0)

@@ -14,7 +14,11 @@ void setStandardOutputAside();
 /// The descriptor of the real standard output.
 int dataOutput();
 
-/// Writes all of a text there, in the form of `printableLines`. Throws DataError.
+/// Waits until a descriptor that does not block takes data again. Throws Interrupted.
+void waitForOutput(int descriptor);
+
+/// Writes all of a text to the real standard output, in the form of `printableLines`. Throws
+/// DataError.
 void printData(const char* given);
 
 }  // namespace vdbdither

@@ -9,6 +9,7 @@
 #include <unistd.h>
 #include <vector>
 
+#include "io/file/standard_streams.h"
 #include "io/vdb/archive_digest.h"
 #include "io/vdb/archive_reader.h"
 #include "io/vdb/grid_checks.h"
@@ -101,6 +102,8 @@ std::string FrameWriter::send(const VdbContents& contents) {
       sent += static_cast<std::size_t>(count);
     } else if (errno == EPIPE) {
       throw DataError("the reader of the pipe has gone");
+    } else if (errno == EAGAIN) {
+      waitForOutput(descriptor_);
     } else if (errno != EINTR) {
       throw DataError(std::string("cannot write to standard output: ") + std::strerror(errno));
     }

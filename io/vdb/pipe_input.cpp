@@ -48,7 +48,7 @@ std::size_t readSome(int descriptor, char* bytes, std::size_t size, const std::s
     waitForInput(descriptor);
     const ssize_t count = ::read(descriptor, bytes, size);
     if (count >= 0) return static_cast<std::size_t>(count);
-    if (errno != EINTR) fail(where);
+    if (errno != EINTR && errno != EAGAIN) fail(where);
   }
 }
 

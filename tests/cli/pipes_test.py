@@ -4,6 +4,7 @@ import os
 import random
 import signal
 import subprocess
+import threading
 import time
 import unittest
 
@@ -173,6 +174,39 @@ class Stops(ProgramTest):
         said = process.stderr.read().decode()
         self.assertEqual(process.wait(), 1)
         self.assertEqual(said, "vdbdither write: the reader of the pipe has gone\n")
+
+    def test_pipes_that_do_not_block_are_waited_for(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(3, 40))
+        expected = self.succeed("mesh2sdf", "part.stl", *MIMAKI)
+        self.assertGreater(len(expected), 500000)
+        read, written = os.pipe()
+        os.set_blocking(written, False)
+        upstream = self.start("mesh2sdf", "part.stl", *MIMAKI, stdout=written)
+        os.close(written)
+        time.sleep(0.5)
+        received = b""
+        while block := os.read(read, 20000):
+            received += block
+            time.sleep(0.001)
+        os.close(read)
+        self.assertEqual((upstream.wait(), upstream.stderr.read(), received == expected), (0, b"", True))
+        read, written = os.pipe()
+        os.set_blocking(read, False)
+        downstream = self.start("read", stdin=read)
+        os.close(read)
+
+        def send():
+            with open(written, "wb") as pipe:
+                for begin in range(0, len(expected), 50000):
+                    pipe.write(expected[begin:begin + 50000])
+                    pipe.flush()
+                    time.sleep(0.01)
+
+        sender = threading.Thread(target=send)
+        sender.start()
+        data, said = downstream.communicate(timeout=60 * PATIENCE)
+        sender.join()
+        self.assertEqual((downstream.returncode, said, data == expected), (0, b"", True))
 
     def test_a_full_disk_at_standard_output_is_reported(self):
         with open("/dev/full", "wb") as full:

@@ -205,6 +205,19 @@ class Signals(ProgramTest):
         self.assertEqual((process.returncode, said), (143, "vdbdither: stopped: Terminated\n"))
         self.assertEqual(self.listing(), before)
 
+    def test_a_run_that_waits_to_open_a_file_can_be_stopped(self):
+        for name in ("pipe.json", "pipe.vdb"):
+            os.mkfifo(self.folder / name)
+        for arguments in (("printers", "check", "pipe.json"), ("mesh2sdf", "part.stl", "--printer", "pipe.json", "-o", "out.vdb"),
+                          ("info", "pipe.vdb"), ("compare", "pipe.vdb", "pipe.vdb")):
+            before = self.listing()
+            process = start_program(self, *arguments)
+            time.sleep(0.2)
+            process.send_signal(signal.SIGTERM)
+            said = process.communicate(timeout=60 * PATIENCE)[1].decode()
+            self.assertEqual((process.returncode, said), (143, "vdbdither: stopped: Terminated\n"), arguments)
+            self.assertEqual(self.listing(), before)
+
     def test_a_run_whose_messages_nobody_reads_can_be_stopped(self):
         reader, writer = os.pipe()
         self.addCleanup(os.close, reader)

@@ -171,6 +171,17 @@ void runProgram(int argc, char** argv) {
   runChain(steps);
 }
 
+/// Runs the program. An error after a signal is a consequence of it, such as a call that came back
+/// early.
+void runStoppable(int argc, char** argv) {
+  try {
+    runProgram(argc, argv);
+  } catch (...) {
+    throwIfInterrupted();
+    throw;
+  }
+}
+
 /// Whether a message begins with the verb that it is about.
 bool namesItsVerb(const std::string& message) {
   const std::string first = message.substr(0, message.find(": "));
@@ -197,7 +208,7 @@ int guardedMain(int argc, char** argv) {
     std::cerr.rdbuf(nullptr);
     noteInterrupts();
     initializeVdb();
-    runProgram(argc, argv);
+    runStoppable(argc, argv);
     claimEnding(0);
     return 0;
   } catch (const Interrupted& error) {

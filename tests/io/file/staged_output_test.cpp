@@ -17,6 +17,7 @@
 #include "io/file/staging_name.h"
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace {
 
@@ -382,15 +383,25 @@ TEST(StagedOutput, WritesBelowItsFolderOnlyAndEachFileOnce) {
   EXPECT_EQ(namesIn(scratch.path()).size(), 1U);
 }
 
-TEST(StagedOutput, RemovesWhatBelongsToAPartialOutputOfAKilledRun) {
+TEST(StagedOutput, IsNotCommittedAfterASignal) {
   const test::ScratchFolder scratch;
-  const pid_t dead = fork();
-  if (dead == 0) _exit(0);
+  const pid_t child = fork();
+  if (child == 0) {
+    noteInterrupts();
+    int code = 1;
+    try {
+      StagedOutput file(scratch / "new", Kind::file);
+      put(file.path(), two);
+      std::raise(SIGTERM);
+      file.commit();
+    } catch (const Interrupted& error) {
+      code = error.signal() == SIGTERM ? 0 : 2;
+    }
+    _exit(code);
+  }
   int status = 0;
-  waitpid(dead, &status, 0);
-  for (const std::string name : {"", ".old", "-faces"})
-    put(scratch / (".out.partial-" + std::to_string(dead) + name), one);
-  StagedOutput(scratch / "out", Kind::file);
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
   EXPECT_THAT(test::filesUnder(scratch.path()), IsEmpty());
 }
 
