@@ -322,7 +322,7 @@ void StagedOutput::commitFolder() {
     if (!renamed(partial_, target_)) fail("write", shown_, errno);
     return;
   }
-  if (!fs::is_directory(target_, ignored)) fail("replace", shown_, ENOTDIR);
+  if (!fs::is_directory(target_, ignored)) keepBeside(ENOTDIR);
   if (renamed(partial_, target_, RENAME_EXCHANGE)) {
     committed_ = true;
     retire(partial_);
@@ -330,14 +330,25 @@ void StagedOutput::commitFolder() {
   }
   fs::path old = partial_;
   old += put_aside;
-  if (!renamed(target_, old)) fail("replace", shown_, errno);
+  if (!renamed(target_, old)) keepBeside(errno);
   if (!renamed(partial_, target_)) {
     const int error = errno;
     renamed(old, target_);
-    fail("replace", shown_, error);
+    keepBeside(error);
   }
   committed_ = true;
   retire(old);
+}
+
+/// A run of hours is not lost because its output cannot take its place: some file systems refuse
+/// only now.
+void StagedOutput::keepBeside(int error) {
+  fs::path kept = target_;
+  kept += ".new";
+  if (isThere(kept) || !renamed(partial_, kept)) fail("replace", shown_, error);
+  committed_ = true;
+  throw DataError("cannot replace " + quoted(shown_) + ": " +
+                  std::generic_category().message(error) + "; the new one is " + quoted(kept));
 }
 
 /// Deletes the own files of the folder that was replaced, and moves others to where they were.

@@ -53,7 +53,9 @@ class StagedOutput {
   /// Gives it its name, in place of what had it before: at every moment the old one or the new one
   /// is there, whole. (Where the file system cannot exchange folders, a run that is killed in this
   /// moment leaves the old one for `putBack`.) Files that somebody else put into the old folder
-  /// since `checkFolder` stay in the folder. Throws Interrupted if the run is to stop.
+  /// since `checkFolder` stay in the folder. Throws DataError; a folder that could not take the
+  /// place of the old one is then kept under its name with `.new`. Throws
+  /// Interrupted if the run is to stop.
   void commit();
 
   /// Removes all outputs of the process that are not committed, and lets none be committed or
@@ -66,6 +68,7 @@ class StagedOutput {
   void begin();
   void removeLeftovers() const;
   void commitFolder();
+  [[noreturn]] void keepBeside(int error);
   void retire(const std::filesystem::path& old) const;
 
   std::filesystem::path shown_;   ///< as the user named it

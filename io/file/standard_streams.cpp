@@ -1,7 +1,6 @@
 #include "io/file/standard_streams.h"
 
 #include <cerrno>
-#include <cstring>
 #include <fcntl.h>
 #include <poll.h>
 #include <string>

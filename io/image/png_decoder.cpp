@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,7 @@ class Decoder {
     SpansBuilder spans(width);
     std::vector<std::uint8_t> row(png_get_rowbytes(png_, info_));
     for (std::uint32_t y = 0; y < height; ++y) {
+      if (y + 1 == height) allowance_ = 2 * row.size() + 65536;
       png_read_row(png_, row.data(), nullptr);
       for (std::uint32_t x = 0; x < width; ++x) {
         std::uint32_t colour = 0;
@@ -53,6 +55,7 @@ class Decoder {
       }
       spans.endRow();
     }
+    allowance_ = unlimited;
     png_read_end(png_, nullptr);
     return spans.finish();
   }
@@ -65,11 +68,19 @@ class Decoder {
   static void read(png_structp png, png_bytep data, std::size_t size) {
     auto& self = *static_cast<Decoder*>(png_get_io_ptr(png));
     if (size > self.bytes_.size()) throw DataError("is no readable PNG: it is cut short");
+    if (size > self.allowance_)
+      throw DataError("is no readable PNG: it holds more than its pixels");
+    if (self.allowance_ != unlimited) self.allowance_ -= size;
     std::copy_n(self.bytes_.begin(), size, data);
     self.bytes_ = self.bytes_.subspan(size);
   }
 
+  static constexpr std::size_t unlimited = std::numeric_limits<std::size_t>::max();
+
   std::span<const std::uint8_t> bytes_;
+  /// Bytes that may still be read. With the last row libpng inflates all that follows, which may be
+  /// a thousand times what is read.
+  std::size_t allowance_ = unlimited;
   png_structp png_ = nullptr;
   png_infop info_ = nullptr;
 };

@@ -22,6 +22,10 @@ constexpr std::size_t largest_piece = std::size_t{1} << 30;
 /// Archives of more files are not read. The tallest stacks have half as many.
 constexpr std::uint64_t most_members = 1 << 18;
 
+/// A member larger than this may not inflate by more than that.
+constexpr std::uint64_t always_inflated = std::uint64_t{16} << 20;
+constexpr std::uint64_t most_inflation = 200;
+
 /// A bit of the flags of a member.
 constexpr std::uint64_t is_encrypted = 1;
 
@@ -122,6 +126,9 @@ void ZipReader::readDirectory() {
     if ((information.flag & is_encrypted) != 0) refuse("is encrypted");
     if (information.compression_method != 0 && information.compression_method != Z_DEFLATED)
       refuse("is neither stored nor deflated");
+    if (information.uncompressed_size > always_inflated &&
+        information.uncompressed_size / most_inflation > information.compressed_size)
+      refuse("inflates more than 200 to 1, as no slice does");
     if (members_.size() == most_members) refuse("is one too many");
     const Member member{place.pos_in_zip_directory, place.num_of_file,
                         information.uncompressed_size};

@@ -1,5 +1,6 @@
 """Stacks of slices that were changed, cut, or made to harm are refused in one line, in limited time and memory."""
 
+import hashlib
 import json
 import os
 import pathlib
@@ -11,6 +12,8 @@ import tempfile
 import unittest
 import warnings
 import zipfile
+import zlib
+from decimal import Decimal
 
 import meshes
 from PIL import Image
@@ -19,6 +22,19 @@ from program import MIMAKI, PATIENCE, PROGRAM, ProgramTest
 # Limits for slow and loaded machines. A run that reads what it is given, or that waits for it, exceeds them.
 SECONDS = 20
 BYTES = 2 << 30
+
+
+def canonical(value):
+    """Returns the text of a JSON value by RFC 8785."""
+    if isinstance(value, dict):
+        keys = sorted(value, key=lambda key: key.encode("utf-16-be"))
+        return "{" + ",".join(f"{canonical(key)}:{canonical(value[key])}" for key in keys) + "}"
+    if isinstance(value, list):
+        return "[" + ",".join(map(canonical, value)) + "]"
+    if isinstance(value, float):
+        text = repr(value)
+        return str(int(value)) if value.is_integer() else format(Decimal(text), "f") if abs(value) >= 1e-6 else text.replace("e-0", "e-")
+    return json.dumps(value, ensure_ascii=False)
 
 
 class Stacks(ProgramTest):
@@ -86,6 +102,12 @@ class Stacks(ProgramTest):
             (self.out / "manifest.json").write_text(write(self.manifest()))
             self.succeed("slice-import", "out", "-o", "x.vdb", "--overwrite")
 
+    def test_the_digest_of_the_manifest_is_that_of_its_canonical_form(self):
+        for stack in ("out", "bits"):
+            manifest = json.loads((self.folder / stack / "manifest.json").read_text())
+            stated = manifest.pop("sha256")
+            self.assertEqual(hashlib.sha256(canonical(manifest).encode()).hexdigest(), stated)
+
     def test_changes_of_the_manifest_or_of_slices_are_refused_unless_they_are_edits(self):
         def flip():
             with Image.open(self.slice(3)) as image:
@@ -145,7 +167,8 @@ class Stacks(ProgramTest):
         self.pack(members=[(name, bytes(300 << 20))], without=[name])
         self.assertLess((self.folder / "x.zip").stat().st_size, 1 << 20)
         for options in ((), ("--edited",)):
-            self.refuse_import(f"'x.zip/{name}' has 314572800 bytes; at most ", "x.zip", *options)
+            self.refuse_import(f"'x.zip': its member '{name}' inflates more than 200 to 1, as no slice does; pack the folder", "x.zip",
+                               *options)
         # The directory lies about the size.
         content = bytearray((self.folder / "x.zip").read_bytes())
         for at in range(len(content) - 46):
@@ -154,8 +177,22 @@ class Stacks(ProgramTest):
         (self.folder / "y.zip").write_bytes(content)
         self.refuse_import(f"'y.zip': its file '{name}' is damaged", "y.zip", "--edited")
 
+    def test_a_member_larger_than_a_slice_is_refused(self):
+        name = self.slice(1).name
+        self.pack(members=[(name, bytes(8 << 20))], without=[name])
+        self.refuse_import(f"'x.zip/{name}' has 8388608 bytes; at most ", "x.zip", "--edited")
+
+    def test_a_slice_that_inflates_beyond_its_pixels_is_refused(self):
+        def chunk(kind, data):
+            return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+        content = self.slice(1).read_bytes()
+        start = content.index(b"IDAT") - 4
+        self.slice(1).write_bytes(content[:start] + chunk(b"IDAT", zlib.compress(bytes(400 << 20))) + chunk(b"IEND", b""))
+        self.refuse_import("is no readable PNG: ", "out", "--edited")
+
     def test_a_manifest_that_inflates_is_refused(self):
-        self.pack(members=[("manifest.json", b" " * (200 << 20))], without=["manifest.json"])
+        self.pack(members=[("manifest.json", b" " * (200 << 20))], without=["manifest.json"], method=zipfile.ZIP_STORED)
         self.refuse_import("'x.zip': its file 'manifest.json' has 209715200 bytes; at most 67108864 are read", "x.zip")
 
     def test_an_archive_of_very_many_members_is_refused(self):

@@ -24,6 +24,7 @@ namespace {
 // A file system that cannot exchange, and a process that dies between two renames.
 bool exchanges = true;
 int renames_to_live = -1;
+std::string rename_that_fails;  ///< the path that cannot be renamed
 
 }  // namespace
 
@@ -31,6 +32,10 @@ extern "C" int renameat2(int from_folder, const char* from, int to_folder, const
                          unsigned flags) noexcept {
   if (flags != 0 && !exchanges) {
     errno = EINVAL;
+    return -1;
+  }
+  if (rename_that_fails == from) {
+    errno = EXDEV;
     return -1;
   }
   if (renames_to_live == 0) _exit(0);
@@ -86,7 +91,10 @@ class OldStack : public testing::Test {
     put(scratch_ / "out/old", one);
     put(scratch_ / "out/white/old", one);
   }
-  void TearDown() override { exchanges = true; }
+  void TearDown() override {
+    exchanges = true;
+    rename_that_fails.clear();
+  }
 
   /// The refusal of overwriting it, with TMP for the scratch folder.
   [[nodiscard]] std::string refusal(const std::string& name = "out") const {
@@ -252,6 +260,22 @@ TEST_F(OldStack, IsReplacedWithoutAnExchange) {
   replace();
   EXPECT_THAT(test::filesUnder(scratch_.path()), UnorderedElementsAre(Pair("out/new", two)));
   EXPECT_THAT(namesIn(scratch_.path()), UnorderedElementsAre("out"));
+}
+
+TEST_F(OldStack, ThatCannotBeReplacedStaysAndTheNewOneIsKeptBesideIt) {
+  exchanges = false;
+  rename_that_fails = (scratch_ / "out").string();
+  const std::string name = (scratch_ / "out").string();
+  EXPECT_THAT(
+      [&] { replace(); },
+      ThrowsMessage<DataError>("cannot replace '" + name +
+                               "': Invalid cross-device link; the new one is '" + name + ".new'"));
+  EXPECT_THAT(namesIn(scratch_.path()), UnorderedElementsAre("out", "out.new"));
+  EXPECT_EQ(test::filesUnder(scratch_ / "out").size(), 2U);
+  EXPECT_THAT(test::filesUnder(scratch_ / "out.new"), UnorderedElementsAre(Pair("new", two)));
+  EXPECT_THAT([&] { replace(); },
+              ThrowsMessage<DataError>("cannot replace '" + name + "': Invalid cross-device link"));
+  EXPECT_THAT(namesIn(scratch_.path()), UnorderedElementsAre("out", "out.new"));
 }
 
 TEST_F(OldStack, IsPutBackAfterARunThatWasKilledBetweenTwoRenames) {

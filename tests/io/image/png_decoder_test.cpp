@@ -1,5 +1,9 @@
 #include "io/image/png_decoder.h"
 
+#include <string>
+#include <vector>
+#include <zlib.h>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -51,6 +55,56 @@ TEST(PngDecoder, DamageIsAnError) {
   }
   bytes[bytes.size() / 2] ^= 16;
   EXPECT_THROW(decodePng(bytes), DataError);
+}
+
+void append(std::vector<std::uint8_t>& bytes, std::uint32_t value) {
+  for (int shift = 24; shift >= 0; shift -= 8)
+    bytes.push_back(static_cast<std::uint8_t>(value >> shift));
+}
+
+/// The bytes of a PNG chunk.
+std::vector<std::uint8_t> chunk(const std::string& type, const std::vector<std::uint8_t>& data) {
+  std::vector<std::uint8_t> bytes;
+  append(bytes, static_cast<std::uint32_t>(data.size()));
+  bytes.insert(bytes.end(), type.begin(), type.end());
+  bytes.insert(bytes.end(), data.begin(), data.end());
+  append(bytes, static_cast<std::uint32_t>(
+                    crc32(0, bytes.data() + 4, static_cast<uInt>(bytes.size() - 4))));
+  return bytes;
+}
+
+std::vector<std::uint8_t> deflated(const std::vector<std::uint8_t>& data) {
+  std::vector<std::uint8_t> packed(compressBound(data.size()));
+  uLongf size = packed.size();
+  EXPECT_EQ(compress2(packed.data(), &size, data.data(), data.size(), 9), Z_OK);
+  packed.resize(size);
+  return packed;
+}
+
+/// A grey image of 8 x 1 pixels with `pixels` for its rows, and `more` behind its header.
+std::vector<std::uint8_t> tinyPng(const std::vector<std::uint8_t>& pixels,
+                                  const std::vector<std::uint8_t>& more) {
+  std::vector<std::uint8_t> bytes{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  std::vector<std::uint8_t> header;
+  append(header, 8);
+  append(header, 1);
+  header.insert(header.end(), {8, 0, 0, 0, 0});
+  for (const std::vector<std::uint8_t>& part :
+       {chunk("IHDR", header), more, chunk("IDAT", deflated(pixels)), chunk("IEND", {})})
+    bytes.insert(bytes.end(), part.begin(), part.end());
+  return bytes;
+}
+
+TEST(PngDecoder, DoesNotInflateWhatIsNoPixel) {
+  const std::vector<std::uint8_t> zeros(std::size_t{128} << 20);
+  const SpanImage black = decodePng(tinyPng({0, 0, 0, 0, 0, 0, 0, 0, 0}, {}));
+  EXPECT_EQ(black.spans, (std::vector<Span>{{8, rgba(0, 0, 0)}}));
+  std::vector<std::uint8_t> text{'k', 0, 0};
+  const std::vector<std::uint8_t> packed = deflated(zeros);
+  text.insert(text.end(), packed.begin(), packed.end());
+  EXPECT_EQ(decodePng(tinyPng({0, 0, 0, 0, 0, 0, 0, 0, 0}, chunk("zTXt", text))), black);
+  EXPECT_THAT([&] { decodePng(tinyPng(zeros, {})); },
+              ThrowsMessage<DataError>("is no readable PNG: it holds more than its pixels"));
 }
 
 }  // namespace
