@@ -72,7 +72,7 @@ class Hollow : public Filter {
   void planBand(const FloatGrid& surface) {
     const double held_mm = heldBandMm(surface);
     const double needed_mm = thickness_mm_ + lattice_.diagonalMm();
-    // What single precision made of a band just as wide as asked for.
+    // A band of exactly the width needed, rounded to single precision.
     constexpr double tolerance = 1 + 1e-6;
     if (held_mm * tolerance < needed_mm) {
       const double asked_mm = std::ceil(needed_mm * 1e3) / 1e3;

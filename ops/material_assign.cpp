@@ -42,8 +42,8 @@ std::vector<std::string> entriesOf(const std::string& text) {
   return entries;
 }
 
-/// Gives every active voxel of a copied topology the value 1. OpenVDB's copy with two values asks
-/// each voxel of each leaf for its state.
+/// Sets every active voxel of a copied topology to 1. OpenVDB's own copy with two values tests each
+/// voxel of each leaf.
 struct ActivesToOne {
   template <typename Node>
   void operator()(Node& node) const {

@@ -11,6 +11,7 @@
 #include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/leaf/part_index.h"
+#include "ops/kernels/mesh/enclosure.h"
 #include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/solid_mesh.h"
@@ -175,8 +176,13 @@ class MeshToSdf : public Source {
 
   std::vector<Mesh> readMeshes() {
     std::vector<Mesh> meshes;
-    for (const std::string& path : paths_)
+    for (const std::string& path : paths_) {
       meshes.push_back(readMesh(path, [this](const std::string& text) { report().warn(text); }));
+      const std::string flat = whyFlat(meshes.back());
+      if (!flat.empty())
+        throw DataError(inQuotes(path) + ": bounds no volume: " + flat +
+                        "; give the surface a thickness in a mesh editor first");
+    }
     return meshes;
   }
 

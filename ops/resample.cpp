@@ -257,7 +257,7 @@ class Resample : public Source {
     return found->second;
   }
 
-  /// How the grid is to be read. Resolves what the options leave open.
+  /// Decides how the grid is read where the options leave it open.
   ZeroSet::Reading readingOf(const FloatGrid& grid) {
     if (is_voxels_) {
       if (kind_ == Kind::level_set)

@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <cctype>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -9,6 +11,7 @@
 
 #include <tbb/task_arena.h>
 
+#include "io/file/file_name.h"
 #include "io/profile/material_table.h"
 #include "io/stack/slice_format.h"
 #include "io/stack/slice_spans.h"
@@ -67,9 +70,9 @@ class SliceExport : public Sink {
     planStack();
     planMaterials();
     planColours();
-    if (names_.prefix.find('/') != std::string::npos)
-      throw UsageError("--prefix: '" + names_.prefix + "' must not hold a '/'");
-    StackOutput::check(folder_, overwrite_.overwrite);
+    planNames();
+    StackOutput::check(folder_, overwrite_.overwrite,
+                       [this](const std::string& text) { report().warn(text); });
     if (in.lattice.box.dim().x() + std::int64_t{2} * stack_.layout.padding > 1 << 24 ||
         in.lattice.box.dim().y() + std::int64_t{2} * stack_.layout.padding > 1 << 24) {
       throw UsageError("slices would be more than 16777216 voxels wide");
@@ -130,7 +133,7 @@ class SliceExport : public Sink {
     return static_cast<double>(format_->filesOfLayer(stack_.materials.size()));
   }
 
-  /// What the stack is known to be, but for its materials.
+  /// Plans everything about the stack except its materials.
   void planStack() {
     const auto metadata = [&](std::string_view key) {
       const auto entry = schema_.metadata.find(key);
@@ -164,6 +167,33 @@ class SliceExport : public Sink {
       throw UsageError(
           "needs a grid 'material' or 'solid'; put dither, and material-assign where there are "
           "materials, before it");
+    }
+  }
+
+  /// Names of files come from the prefix, and of folders from the materials.
+  void planNames() const {
+    const int last = names_.first + schema_.lattice.layers().size() - 1;
+    const std::size_t digits =
+        std::max(std::to_string(last).size(), static_cast<std::size_t>(names_.digits));
+    const std::string slice =
+        names_.prefix + std::string(digits, '0') + std::string(format_->ending);
+    if (const auto problem = fileNameProblem(slice))
+      throw UsageError("--prefix: the name of a slice, '" + slice + "', " + *problem);
+    if (format_->pixel != SlicePixel::one_material) return;
+    std::set<std::string> folders{manifest_name, preview_name};
+    for (const Material& material : stack_.materials) {
+      std::optional<std::string> problem = fileNameProblem(material.name);
+      std::string folder = material.name;
+      std::transform(folder.begin(), folder.end(), folder.begin(),
+                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+      if (!problem && !folders.insert(folder).second)
+        problem = "is that of another one, or of a file of the stack";
+      if (!problem) continue;
+      throw DataError(
+          format_name_ + " has a folder for each material, and the name of the material '" +
+          material.name + "' " + *problem + "; give it another one with material-assign, or take " +
+          sliceFormatNames(
+              [](const SliceFormat& other) { return other.pixel != SlicePixel::one_material; }));
     }
   }
 

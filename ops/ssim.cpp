@@ -2,8 +2,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -24,6 +26,16 @@ namespace vdbdither {
 namespace {
 
 using nlohmann::ordered_json;
+
+// The names of the maps.
+constexpr const char* plain_map = "ssim.png";
+constexpr const char* seen_map = "ssim-seen.png";
+constexpr const char* flip_map = "flip.png";
+
+/// What this tool writes into any folder.
+std::set<std::string> mapNames(const std::filesystem::path& /*folder*/) {
+  return {plain_map, seen_map, flip_map};
+}
 
 /// The channels over a grey background, sRGB-coded, 0 to 1.
 ColourChannels channelsOf(const Picture& picture, double background) {
@@ -88,7 +100,8 @@ class Ssim : public Tool {
                        " pixels per degree; the value must be from 5 to 1000");
     }
     if (!maps_folder_.empty())
-      StagedOutput::check(maps_folder_, StagedOutput::Kind::folder, overwrite_.overwrite);
+      StagedOutput::checkFolder(maps_folder_, overwrite_.overwrite, mapNames,
+                                [this](const std::string& text) { report().warn(text); });
 
     const Picture reference = readPicture(reference_file_);
     const Picture picture = readPicture(picture_file_);
@@ -110,10 +123,10 @@ class Ssim : public Tool {
                                       meanOver(flip, object)};
 
     if (!maps_folder_.empty()) {
-      StagedOutput staged(maps_folder_, StagedOutput::Kind::folder);
-      staged.write("ssim.png", greyPng(plain));
-      staged.write("ssim-seen.png", greyPng(seen));
-      staged.write("flip.png", greyPng(flip));
+      StagedOutput staged(maps_folder_, StagedOutput::Kind::folder, mapNames);
+      staged.write(plain_map, greyPng(plain));
+      staged.write(seen_map, greyPng(seen));
+      staged.write(flip_map, greyPng(flip));
       staged.commit();
     }
     printData(textOf(reference, object.size(), pixels_per_degree, means).c_str());

@@ -1,5 +1,4 @@
 #include <array>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <unistd.h>
@@ -11,6 +10,7 @@
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
 #include "io/mesh/mesh_format.h"
+#include "io/stack/slice_format.h"
 #include "io/vdb/frames.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/operator.h"
@@ -133,13 +133,10 @@ class WriteOperator : public Sink {
       throw UsageError("'" + path_ +
                        "' is a mesh by its name, and this is a .vdb; mesh-export "
                        "writes meshes");
-    const std::string extension = std::filesystem::path(path_).extension();
-    for (const char* picture : {".png", ".tif", ".tiff", ".exr", ".zip"}) {
-      if (extension == picture)
-        throw UsageError("'" + path_ +
-                         "' holds pictures by its name, and this is a .vdb; "
-                         "slice-export writes slices and render a picture");
-    }
+    if (namesSlice(path_) || namesArchive(path_))
+      throw UsageError("'" + path_ +
+                       "' holds pictures by its name, and this is a .vdb; "
+                       "slice-export writes slices and render a picture");
   }
 
   void beginFrames() {

@@ -35,6 +35,7 @@ void BufferedFile::appendAllOf(BufferedFile& other) {
   std::vector<char> block(buffer_bytes);
   for (;;) {
     const ssize_t got = ::pread(other.file_, block.data(), block.size(), at);
+    if (got < 0 && errno == EINTR) continue;
     if (got < 0) fail();
     if (got == 0) return;
     append(block.data(), static_cast<std::size_t>(got));
@@ -44,7 +45,15 @@ void BufferedFile::appendAllOf(BufferedFile& other) {
 
 void BufferedFile::patch(off_t offset, const void* data, std::size_t size) {
   flush();
-  if (::pwrite(file_, data, size, offset) != static_cast<ssize_t>(size)) fail();
+  const char* at = static_cast<const char*>(data);
+  while (size > 0) {
+    const ssize_t written = ::pwrite(file_, at, size, offset);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail();
+    at += written;
+    offset += written;
+    size -= static_cast<std::size_t>(written);
+  }
 }
 
 void BufferedFile::close() {

@@ -1,16 +1,20 @@
 #include "io/file/staged_output.h"
 
+#include <algorithm>
 #include <cerrno>
-#include <charconv>
-#include <csignal>
 #include <cstdio>
-#include <cstring>
 #include <fcntl.h>
-#include <string>
+#include <map>
+#include <mutex>
+#include <shared_mutex>
 #include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
+#include <utility>
+#include <vector>
 
+#include "io/file/file_name.h"
+#include "io/file/staging_name.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -19,10 +23,20 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Without a trailing slash, so that it has a file name.
+std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
+
+[[noreturn]] void fail(const std::string& what, const fs::path& path, int error) {
+  throw DataError("cannot " + what + " " + quoted(path) + ": " +
+                  std::generic_category().message(error));
+}
+
+/// Without what may follow the name of a folder, so that it has a file name. Nothing else is
+/// simplified: `..` behind a link leads elsewhere than the text says.
 fs::path named(const fs::path& target) {
-  const fs::path normal = target.lexically_normal();
-  return normal.has_filename() ? normal : normal.parent_path();
+  std::string text = target.string();
+  while (text.size() > 1 && (text.ends_with('/') || text.ends_with("/.")))
+    text.resize(text.size() - 1);
+  return text;
 }
 
 fs::path parentOf(const fs::path& target) {
@@ -30,104 +44,129 @@ fs::path parentOf(const fs::path& target) {
   return parent.empty() ? "." : parent;
 }
 
-std::string partialPrefix(const fs::path& target) {
-  return "." + target.filename().string() + ".partial-";
+bool isThere(const fs::path& path) {
+  std::error_code none;
+  return fs::exists(fs::symlink_status(path, none));
 }
 
-[[noreturn]] void fail(const std::string& what, const fs::path& path, int error) {
-  throw DataError("cannot " + what + " '" + path.string() +
-                  "': " + std::generic_category().message(error));
+bool isLink(const fs::path& path) {
+  std::error_code none;
+  return fs::is_symlink(fs::symlink_status(path, none));
 }
 
-}  // namespace
-
-void StagedOutput::check(const fs::path& given, Kind kind, bool overwrite) {
-  const fs::path target = named(given);
-  const std::string name = "'" + given.string() + "'";
-  if (target.empty() || target.filename() == "." || target.filename() == ".." ||
-      !target.has_filename()) {
-    throw UsageError("cannot write to " + name + ": give a folder or file a name of its own");
+/// What `given` names, behind symbolic links. Whether it is there does not matter.
+fs::path destination(const fs::path& given) {
+  constexpr int most_links = 40;
+  fs::path path = named(given);
+  for (int links = 0; isLink(path); ++links) {
+    std::error_code error;
+    const fs::path next = fs::read_symlink(path, error);
+    if (error || links == most_links)
+      throw UsageError("cannot write to " + quoted(given) + ": the link leads nowhere");
+    path = named(path.parent_path() / next);
   }
-  std::error_code ignored;
-  const fs::file_status status = fs::status(target, ignored);
-  if (!fs::exists(status)) {
-    if (!fs::is_directory(parentOf(target), ignored)) {
-      throw UsageError("cannot write to " + name + ": there is no folder '" +
-                       parentOf(target).string() + "'");
-    }
-    return;
+  return path;
+}
+
+/// Renames as renameat2 does, with these flags. Returns whether it worked, or sets errno.
+bool renamed(const fs::path& from, const fs::path& to, unsigned flags = 0) {
+  return ::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), flags) == 0;
+}
+
+/// The outputs that this process is writing: the target of each and its partial path. Two of one
+/// target would share a partial path. Never destroyed, because a thread may end the process while
+/// another destroys static objects.
+class Written {
+ public:
+  static Written& all() {
+    static auto* const written = new Written;
+    return *written;
   }
-  if (kind == Kind::folder && !fs::is_directory(status))
-    throw UsageError(name + " exists and is not a folder");
-  if (kind == Kind::file && fs::is_directory(status))
-    throw UsageError(name + " is a folder; name a file in it");
-  if (kind == Kind::file && !fs::is_regular_file(status))
-    throw UsageError(name + " is not an ordinary file");
-  if (kind == Kind::folder && fs::is_empty(target, ignored)) return;
-  if (!overwrite) throw UsageError(name + " exists; --overwrite replaces it");
-}
-
-StagedOutput::StagedOutput(const fs::path& target, Kind kind) : target_(named(target)) {
-  partial_ = parentOf(target_) / (partialPrefix(target_) + std::to_string(::getpid()));
-  removeLeftovers();
-  if (kind == Kind::folder && ::mkdir(partial_.c_str(), 0777) != 0) fail("make", target_, errno);
-}
-
-StagedOutput::~StagedOutput() {
-  std::error_code ignored;
-  if (!committed_) fs::remove_all(partial_, ignored);
-}
-
-void StagedOutput::removeLeftovers() const {
-  const std::string prefix = partialPrefix(target_);
-  std::error_code ignored;
-  for (const fs::directory_entry& entry : fs::directory_iterator(parentOf(target_), ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with(prefix)) continue;
-    pid_t owner = 0;
-    const char* end = name.data() + name.size();
-    if (std::from_chars(name.data() + prefix.size(), end, owner).ptr != end || owner <= 0) continue;
-    if (owner == ::getpid() || (::kill(owner, 0) != 0 && errno == ESRCH))
-      fs::remove_all(entry.path(), ignored);
+  /// Returns false if the target is being written already.
+  bool insert(const fs::path& target, const fs::path& partial) {
+    const std::lock_guard lock(mutex_);
+    return partials_.emplace(keyOf(target), partial).second;
   }
+  void erase(const fs::path& target) {
+    const std::lock_guard lock(mutex_);
+    partials_.erase(keyOf(target));
+  }
+  bool contains(const fs::path& target) {
+    const std::lock_guard lock(mutex_);
+    return partials_.contains(keyOf(target));
+  }
+  std::vector<fs::path> partials() {
+    const std::lock_guard lock(mutex_);
+    std::vector<fs::path> paths;
+    for (const auto& [target, partial] : partials_) paths.push_back(partial);
+    return paths;
+  }
+
+  /// Held during each change that makes a new name: shared by writers; exclusively, and for ever,
+  /// by the thread that abandons all outputs.
+  std::shared_timed_mutex naming;
+
+ private:
+  static fs::path keyOf(const fs::path& target) {
+    std::error_code none;
+    return fs::weakly_canonical(parentOf(target), none) / target.filename();
+  }
+
+  std::mutex mutex_;
+  std::map<fs::path, fs::path> partials_;
+};
+
+bool isMountPoint(const fs::path& path) {
+  struct statx status {};
+  return ::statx(AT_FDCWD, path.c_str(), 0, 0, &status) == 0 &&
+         (status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0;
 }
 
-void StagedOutput::write(const fs::path& name, std::span<const std::uint8_t> bytes) const {
-  const fs::path path = partial_ / name;
+/// Everything below `folder`, links not followed.
+std::vector<fs::directory_entry> entriesBelow(const fs::path& folder) {
+  std::vector<fs::directory_entry> entries;
   std::error_code error;
-  if (name.has_parent_path()) fs::create_directories(path.parent_path(), error);
-  if (error) fail("make", target_ / name.parent_path(), error.value());
-  writeFile(path, bytes, target_ / name);
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    entries.push_back(*entry);
+  if (error) fail("read", folder, error.value());
+  return entries;
 }
 
-void StagedOutput::commit() {
-  // An exchange keeps a whole output in place all the time; where the file system has none, or
-  // there is nothing to replace, the rename does.
-  if (::renameat2(AT_FDCWD, partial_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) == 0) {
-    committed_ = true;
-    std::error_code ignored;
-    fs::remove_all(partial_, ignored);
-    return;
-  }
-  if (errno != ENOENT && fs::is_directory(target_)) {
-    fs::path old = partial_;
-    old += ".old";
-    if (::rename(target_.c_str(), old.c_str()) != 0) fail("replace", target_, errno);
-    std::error_code ignored;
-    if (::rename(partial_.c_str(), target_.c_str()) != 0) {
-      const int error = errno;
-      fs::rename(old, target_, ignored);
-      fail("replace", target_, error);
+bool isFolder(const fs::directory_entry& entry) {
+  std::error_code none;
+  return entry.symlink_status(none).type() == fs::file_type::directory;
+}
+
+/// The first path below `folder` that `own` does not name, or nothing. A folder is named by what
+/// is in it.
+fs::path foreignIn(const fs::path& folder, const std::set<std::string>& own) {
+  std::vector<fs::path> foreign;
+  for (const fs::directory_entry& entry : entriesBelow(folder)) {
+    fs::path path = entry.path().lexically_relative(folder);
+    const std::string name = path.string();
+    bool is_own = own.contains(name);
+    if (isFolder(entry)) {
+      const auto below = own.lower_bound(name + "/");
+      is_own = below != own.end() && below->starts_with(name + "/");
     }
-    fs::remove_all(old, ignored);
-  } else if (::rename(partial_.c_str(), target_.c_str()) != 0) {
-    fail("write", target_, errno);
+    if (!is_own) foreign.push_back(std::move(path));
   }
-  committed_ = true;
+  return foreign.empty() ? fs::path() : *std::min_element(foreign.begin(), foreign.end());
 }
 
-void writeFile(const fs::path& path, std::span<const std::uint8_t> bytes, const fs::path& shown) {
-  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+/// Gives the folder that a killed run had put aside its name again, if there is one.
+bool foundAside(const fs::path& target) {
+  if (isThere(target)) return false;
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(parentOf(target), none)) {
+    const auto name = parseStagingName(target, entry.path().filename().string());
+    if (name && name->is_put_aside && renamed(entry.path(), target)) return true;
+  }
+  return false;
+}
+
+void writeBytes(int file, std::span<const std::uint8_t> bytes, const fs::path& shown) {
   if (file < 0) fail("write", shown, errno);
   while (!bytes.empty()) {
     const ssize_t written = ::write(file, bytes.data(), bytes.size());
@@ -140,6 +179,196 @@ void writeFile(const fs::path& path, std::span<const std::uint8_t> bytes, const 
     bytes = bytes.subspan(static_cast<std::size_t>(written));
   }
   if (::close(file) != 0) fail("write", shown, errno);
+}
+
+}  // namespace
+
+void StagedOutput::check(const fs::path& given, Kind kind, bool overwrite) {
+  const fs::path target = destination(given);
+  const std::string name = quoted(given);
+  if (target.empty() || target.filename() == "." || target.filename() == ".." ||
+      !target.has_filename()) {
+    throw UsageError("cannot write to " + name + ": give a folder or file a name of its own");
+  }
+  if (Written::all().contains(target))
+    throw UsageError(name + " is written by another step already");
+  std::error_code ignored;
+  const fs::file_status status = fs::status(target, ignored);
+  if (!fs::exists(status)) {
+    if (target.filename().string().size() > longest_file_name) {
+      throw UsageError("cannot write to " + name + ": a name has at most " +
+                       std::to_string(longest_file_name) + " bytes");
+    }
+    if (!fs::is_directory(parentOf(target), ignored)) {
+      throw UsageError("cannot write to " + name + ": there is no folder " +
+                       quoted(parentOf(target)));
+    }
+    if (::access(parentOf(target).c_str(), W_OK | X_OK) != 0) fail("write", given, errno);
+    return;
+  }
+  if (kind == Kind::folder && !fs::is_directory(status))
+    throw UsageError(name + " exists and is not a folder");
+  if (kind == Kind::file && fs::is_directory(status))
+    throw UsageError(name + " is a folder; name a file in it");
+  if (kind == Kind::file && !fs::is_regular_file(status))
+    throw UsageError(name + " is not an ordinary file");
+  if (isMountPoint(target))
+    throw UsageError(name + " is a mount point, which cannot be replaced; name something in it");
+  if (kind == Kind::folder && fs::equivalent(target, ".", ignored))
+    throw UsageError(name + " is the current folder, which cannot be replaced; go to another one");
+  if (::access(parentOf(target).c_str(), W_OK | X_OK) != 0 ||
+      (kind == Kind::folder && ::access(target.c_str(), R_OK | W_OK | X_OK) != 0))
+    fail("replace", given, errno);
+  if (kind == Kind::folder && fs::is_empty(target, ignored)) return;
+  if (!overwrite) throw UsageError(name + " exists; --overwrite replaces it");
+}
+
+void StagedOutput::putBack(const fs::path& target,
+                           const std::function<void(const std::string&)>& warn) {
+  if (foundAside(destination(target))) {
+    warn(quoted(target) +
+         " was being replaced when a run was killed; the folder before it is put back");
+  }
+}
+
+void StagedOutput::checkFolder(const fs::path& given, bool overwrite, const OwnFiles& own,
+                               const std::function<void(const std::string&)>& warn) {
+  putBack(given, warn);
+  const fs::path target = destination(given);
+  check(given, Kind::folder, overwrite);
+  std::error_code none;
+  if (!isThere(target) || fs::is_empty(target, none)) return;
+  const fs::path foreign = foreignIn(target, own(target));
+  if (!foreign.empty()) {
+    throw UsageError(quoted(given) + " holds " + quoted(foreign) +
+                     ", which was not written with the rest; move it elsewhere, or name another "
+                     "folder");
+  }
+}
+
+StagedOutput::StagedOutput(const fs::path& target, Kind kind, OwnFiles own)
+    : shown_(named(target)),
+      target_(destination(target)),
+      partial_(stagingPath(target_)),
+      kind_(kind),
+      own_(std::move(own)) {
+  if (!Written::all().insert(target_, partial_))
+    throw UsageError(quoted(target) + " is written by another step already");
+  try {
+    begin();
+  } catch (...) {
+    Written::all().erase(target_);
+    throw;
+  }
+}
+
+void StagedOutput::begin() {
+  removeLeftovers();
+  const std::shared_lock naming(Written::all().naming);
+  if (kind_ == Kind::folder && ::mkdir(partial_.c_str(), 0777) != 0) fail("make", shown_, errno);
+}
+
+StagedOutput::~StagedOutput() {
+  std::error_code ignored;
+  if (!committed_) fs::remove_all(partial_, ignored);
+  Written::all().erase(target_);
+}
+
+void StagedOutput::abandonAll(std::chrono::milliseconds patience) {
+  // Never unlocked. A write to a network disk that does not answer may hold it: then go on without.
+  (void)Written::all().naming.try_lock_for(patience);
+  for (const fs::path& path : Written::all().partials()) {
+    std::error_code ignored;
+    // Another thread may remove the same files, which ends an attempt early.
+    for (int attempt = 0; attempt < 10 && isThere(path); ++attempt) fs::remove_all(path, ignored);
+  }
+}
+
+void StagedOutput::removeLeftovers() const {
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(parentOf(target_), ignored)) {
+    const auto name = parseStagingName(target_, entry.path().filename().string());
+    if (name && name->abandoned) fs::remove_all(entry.path(), ignored);
+  }
+}
+
+void StagedOutput::write(const std::string& name, std::span<const std::uint8_t> bytes) const {
+  if (const auto problem = relativePathProblem(name))
+    throw DataError("cannot write " + quoted(shown_ / name) + ": the name " + *problem);
+  const std::shared_lock naming(Written::all().naming);
+  const fs::path path = partial_ / name;
+  std::error_code error;
+  if (path.parent_path() != partial_) fs::create_directories(path.parent_path(), error);
+  if (error) fail("make", (shown_ / name).parent_path(), error.value());
+  writeBytes(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666), bytes,
+             shown_ / name);
+}
+
+void StagedOutput::commit() {
+  const std::shared_lock naming(Written::all().naming);
+  if (kind_ == Kind::folder) {
+    commitFolder();
+  } else if (!renamed(partial_, target_)) {
+    fail("write", shown_, errno);
+  }
+  committed_ = true;
+}
+
+void StagedOutput::commitFolder() {
+  std::error_code ignored;
+  if (!isThere(target_)) {
+    if (!renamed(partial_, target_)) fail("write", shown_, errno);
+    return;
+  }
+  if (!fs::is_directory(target_, ignored)) fail("replace", shown_, ENOTDIR);
+  if (renamed(partial_, target_, RENAME_EXCHANGE)) {
+    committed_ = true;
+    retire(partial_);
+    return;
+  }
+  fs::path old = partial_;
+  old += put_aside;
+  if (!renamed(target_, old)) fail("replace", shown_, errno);
+  if (!renamed(partial_, target_)) {
+    const int error = errno;
+    renamed(old, target_);
+    fail("replace", shown_, error);
+  }
+  committed_ = true;
+  retire(old);
+}
+
+/// Deletes the own files of the folder that was replaced, and moves others to where they were.
+void StagedOutput::retire(const fs::path& old) const {
+  std::error_code ignored;
+  try {
+    if (own_) {
+      for (const std::string& name : own_(old)) fs::remove(old / name, ignored);
+    }
+  } catch (const Error&) {
+    // Nobody knows any more which files these are, so all of them stay.
+  }
+  std::vector<fs::path> folders{old};
+  for (const fs::directory_entry& entry : entriesBelow(old)) {
+    if (isFolder(entry)) {
+      folders.push_back(entry.path());
+      continue;
+    }
+    const fs::path stays = target_ / entry.path().lexically_relative(old);
+    if (isThere(stays)) {
+      // The new output has a file of this name, which replaces it.
+      fs::remove(entry.path(), ignored);
+    } else {
+      fs::create_directories(stays.parent_path(), ignored);
+      fs::rename(entry.path(), stays, ignored);
+    }
+  }
+  std::reverse(folders.begin(), folders.end());
+  for (const fs::path& folder : folders) fs::remove(folder, ignored);
+}
+
+void writeFile(const fs::path& path, std::span<const std::uint8_t> bytes, const fs::path& shown) {
+  writeBytes(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666), bytes, shown);
 }
 
 }  // namespace vdbdither

@@ -1,24 +1,44 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <set>
 #include <span>
+#include <string>
 
 namespace vdbdither {
 
 /// A file or folder that exists under its name only once it is complete. It is written as the
-/// hidden sibling `.NAME.partial-PID` and renamed at the end; a run that fails removes it, and what
-/// a killed run left behind is removed by the next one that writes the same name.
+/// hidden sibling `.NAME.partial-MACHINE-PID` and renamed at the end; a run that fails removes it,
+/// and what a killed run of this machine left behind is removed by the next one that writes the
+/// same name. A symbolic link stays, and what it leads to is written.
 class StagedOutput {
  public:
   enum class Kind { file, folder };
 
-  /// Whether `target` can be written: its parent exists, and it does not exist itself or may be
+  /// Returns the paths, below a folder that exists, of the files that an earlier output of the same
+  /// kind wrote there. Throws UsageError where that is unknown.
+  using OwnFiles = std::function<std::set<std::string>(const std::filesystem::path& folder)>;
+
+  /// Checks that `target` can be written: its parent exists, and it does not exist itself or may be
   /// overwritten (an empty folder always may). Throws UsageError.
   static void check(const std::filesystem::path& target, Kind kind, bool overwrite);
 
-  /// Makes the folder, or for a file nothing yet. Throws DataError.
-  StagedOutput(const std::filesystem::path& target, Kind kind);
+  /// Puts back the folder `target` where a killed run had put it aside, with a warning.
+  static void putBack(const std::filesystem::path& target,
+                      const std::function<void(const std::string&)>& warn);
+
+  /// The same as `check` for a folder, in which an overwriting run deletes `own` files only:
+  /// anything else in it is refused. Calls `putBack` first.
+  static void checkFolder(const std::filesystem::path& target, bool overwrite, const OwnFiles& own,
+                          const std::function<void(const std::string&)>& warn);
+
+  /// Makes the folder, or for a file nothing yet. Throws DataError, and UsageError where this
+  /// process is writing the same target already.
+  /// @param own  which files of a folder are replaced
+  StagedOutput(const std::filesystem::path& target, Kind kind, OwnFiles own = {});
   StagedOutput(const StagedOutput&) = delete;
   StagedOutput& operator=(const StagedOutput&) = delete;
   ~StagedOutput();
@@ -27,18 +47,32 @@ class StagedOutput {
   [[nodiscard]] const std::filesystem::path& path() const { return partial_; }
 
   /// Writes a whole file of the folder, and the folders on its way. Throws DataError naming it as
-  /// the user will see it.
-  void write(const std::filesystem::path& name, std::span<const std::uint8_t> bytes) const;
+  /// the user will see it, also where `name` is no path below the folder or is written already.
+  void write(const std::string& name, std::span<const std::uint8_t> bytes) const;
 
   /// Gives it its name, in place of what had it before: at every moment the old one or the new one
-  /// is there, whole.
+  /// is there, whole. (Where the file system cannot exchange folders, a run that is killed in this
+  /// moment leaves the old one for `putBack`.) Files that somebody else put into
+  /// the old folder since `checkFolder` stay in the folder.
   void commit();
 
- private:
-  void removeLeftovers() const;
+  /// Removes all outputs of the process that are not committed, and lets none be committed or
+  /// written to any more: threads that try stay where they are. For a process that ends without
+  /// its destructors.
+  /// \param patience  how long to wait for a write that is under way
+  static void abandonAll(std::chrono::milliseconds patience);
 
-  std::filesystem::path target_;
+ private:
+  void begin();
+  void removeLeftovers() const;
+  void commitFolder();
+  void retire(const std::filesystem::path& old) const;
+
+  std::filesystem::path shown_;   ///< as the user named it
+  std::filesystem::path target_;  ///< behind links
   std::filesystem::path partial_;
+  Kind kind_;
+  OwnFiles own_;
   bool committed_ = false;
 };
 

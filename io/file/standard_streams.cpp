@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <fcntl.h>
 #include <string>
 #include <unistd.h>
 
@@ -16,6 +17,14 @@ namespace {
 int data_descriptor = STDOUT_FILENO;
 
 }  // namespace
+
+void openStandardDescriptors() {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(descriptor, F_GETFD) >= 0 || errno != EBADF) continue;
+    // It gets the lowest number that is free, and only the wrong direction.
+    ::open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+  }
+}
 
 void setStandardOutputAside() {
   const int copy = ::dup(STDOUT_FILENO);

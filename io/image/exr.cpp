@@ -115,6 +115,18 @@ class Rows {
   std::vector<std::vector<char>> values_;
 };
 
+/// What a header may make OpenEXR allocate before the size of the picture is known here.
+void limitSizes() {
+  static const bool once = [] {
+    constexpr int widest = 1 << 24;
+    constexpr int largest_tile = 4096;
+    Imf::Header::setMaxImageSize(widest, widest);
+    Imf::Header::setMaxTileSize(largest_tile, largest_tile);
+    return true;
+  }();
+  static_cast<void>(once);
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> encodeExr(std::uint32_t width, std::uint32_t height,
@@ -152,11 +164,17 @@ std::vector<std::uint8_t> encodeExr(std::uint32_t width, std::uint32_t height,
   return bytes;
 }
 
-SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel) {
+SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel,
+                    const SizeCheck& check) {
+  limitSizes();
   try {
     MemorySource source(bytes);
     Imf::InputFile file(source, 0);
     const Imath::Box2i window = file.header().dataWindow();
+    if (check) {
+      const Imath::V2i size = window.size() + Imath::V2i(1);
+      check(static_cast<std::uint32_t>(size.x), static_cast<std::uint32_t>(size.y));
+    }
     if (!file.header().channels().findChannel(channel))
       throw DataError("has no channel '" + channel + "'");
     const int width = window.max.x - window.min.x + 1;

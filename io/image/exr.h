@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "io/image/size_check.h"
 #include "vdbdither/model/span_image.h"
 
 namespace vdbdither {
@@ -34,6 +35,8 @@ std::vector<std::uint8_t> encodeExr(std::uint32_t width, std::uint32_t height,
 
 /// A channel of whole numbers from 0, as spans of them. Throws DataError in words that go on from
 /// the file's name.
-SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel);
+/// @param check  gets the size before the pixels are read
+SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel,
+                    const SizeCheck& check = {});
 
 }  // namespace vdbdither

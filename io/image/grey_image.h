@@ -12,9 +12,10 @@ struct GreyImage {
   std::vector<float> values;  ///< row by row, the top first
 };
 
-/// Reads a grey PNG of 8 or 16 bits, as 0 … 1 without any correction for display, or an OpenEXR
-/// file, as its numbers are: its channel Y, or the only one. Throws UsageError where there is no
-/// such file, DataError where it is damaged, in colour, or holds values that are not finite.
+/// Reads a grey PNG of 8 or 16 bits as values from 0 to 1, without correction for display, or the
+/// unchanged values of an OpenEXR file: of its channel Y, or of the only one. Throws UsageError if
+/// there is no such file, DataError if it is damaged, in colour, or holds values that are not
+/// finite.
 GreyImage readGreyImage(const std::filesystem::path& path);
 
 }  // namespace vdbdither

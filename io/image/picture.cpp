@@ -1,28 +1,36 @@
 #include "io/image/picture.h"
 
-#include <fstream>
-#include <iterator>
 #include <string>
 
 #include <png.h>
 
+#include "io/file/whole_file.h"
 #include "io/image/png_decoder.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 
+namespace {
+
+/// Comparing pictures takes some hundred bytes for each pixel.
+constexpr std::uint64_t most_pixels = std::uint64_t{1} << 26;
+constexpr std::uint64_t most_bytes = std::uint64_t{1} << 29;
+
+}  // namespace
+
 Picture readPicture(const std::filesystem::path& path) {
+  const std::string shown = "'" + path.string() + "'";
   std::error_code error;
-  if (!std::filesystem::exists(path, error))
-    throw DataError("no such file '" + path.string() + "'");
-  if (!std::filesystem::is_regular_file(path, error))
-    throw DataError("'" + path.string() + "' is not a file");
-  std::ifstream stream(path, std::ios::binary);
-  const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), {});
-  if (!stream) throw DataError("cannot read '" + path.string() + "'");
+  if (!std::filesystem::exists(path, error)) throw DataError("no such file " + shown);
+  const std::vector<std::uint8_t> bytes = readWholeFile(path, shown, most_bytes);
   SpanImage spans;
   try {
-    spans = decodePng({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+    spans = decodePng(bytes, [](std::uint32_t width, std::uint32_t height) {
+      if (std::uint64_t{width} * height > most_pixels) {
+        throw DataError("has " + std::to_string(width) + " x " + std::to_string(height) +
+                        " pixels; at most " + std::to_string(most_pixels) + " are read");
+      }
+    });
   } catch (const DataError& problem) {
     throw DataError("'" + path.string() + "' " + problem.what());
   }

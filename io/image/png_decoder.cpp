@@ -13,8 +13,8 @@ namespace vdbdither {
 
 namespace {
 
-/// Errors leave libpng as exceptions: it is told to, and its frames hold nothing to be freed that
-/// its structures do not own.
+/// Errors leave libpng as exceptions, thrown by its error callback. This is safe because the stack
+/// frames of libpng own nothing: its structures do.
 class Decoder {
  public:
   explicit Decoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {
@@ -23,13 +23,18 @@ class Decoder {
     if (!info_) throw std::bad_alloc();
     png_set_read_fn(png_, this, read);
     png_set_user_limits(png_, 1 << 24, 1 << 24);
+    // Text and profiles may inflate to any size, and none of them is wanted.
+    png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
   }
   Decoder(const Decoder&) = delete;
   Decoder& operator=(const Decoder&) = delete;
   ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }
 
-  SpanImage run() {
+  SpanImage run(const SizeCheck& check) {
     png_read_info(png_, info_);
+    const std::uint32_t width = png_get_image_width(png_, info_);
+    const std::uint32_t height = png_get_image_height(png_, info_);
+    if (check) check(width, height);
     if (png_get_interlace_type(png_, info_) != PNG_INTERLACE_NONE)
       throw DataError("is interlaced; save it without");
     png_set_expand(png_);
@@ -37,8 +42,6 @@ class Decoder {
     png_set_gray_to_rgb(png_);
     png_set_add_alpha(png_, 255, PNG_FILLER_AFTER);
     png_read_update_info(png_, info_);
-    const std::uint32_t width = png_get_image_width(png_, info_);
-    const std::uint32_t height = png_get_image_height(png_, info_);
     SpansBuilder spans(width);
     std::vector<std::uint8_t> row(png_get_rowbytes(png_, info_));
     for (std::uint32_t y = 0; y < height; ++y) {
@@ -73,6 +76,8 @@ class Decoder {
 
 }  // namespace
 
-SpanImage decodePng(std::span<const std::uint8_t> bytes) { return Decoder(bytes).run(); }
+SpanImage decodePng(std::span<const std::uint8_t> bytes, const SizeCheck& check) {
+  return Decoder(bytes).run(check);
+}
 
 }  // namespace vdbdither

@@ -61,6 +61,9 @@ int noteError(TIFF*, void* user, const char*, const char* format, va_list argume
 
 int ignoreWarning(TIFF*, void*, const char*, const char*, va_list) { return 1; }
 
+/// What a header may make libtiff allocate, in bytes.
+constexpr tmsize_t most_at_once = tmsize_t{1} << 28;
+
 using TiffHandle = std::unique_ptr<TIFF, decltype(&TIFFClose)>;
 
 TiffHandle open(Memory& memory, const char* mode) {
@@ -68,6 +71,7 @@ TiffHandle open(Memory& memory, const char* mode) {
       TIFFOpenOptionsAlloc(), TIFFOpenOptionsFree);
   TIFFOpenOptionsSetErrorHandlerExtR(options.get(), noteError, &memory);
   TIFFOpenOptionsSetWarningHandlerExtR(options.get(), ignoreWarning, nullptr);
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), most_at_once);
   return {TIFFClientOpenExt("memory", mode, &memory, readMemory, writeMemory, seekMemory,
                             closeMemory, sizeOfMemory, nullptr, nullptr, options.get()),
           TIFFClose};
@@ -133,7 +137,7 @@ std::vector<std::uint8_t> encodeTiff(const SpanImage& image, const TiffFormat& f
   return std::move(memory.bytes);
 }
 
-SpanImage decodeTiff(std::span<const std::uint8_t> bytes) {
+SpanImage decodeTiff(std::span<const std::uint8_t> bytes, const SizeCheck& check) {
   Memory memory{{bytes.begin(), bytes.end()}, 0, ""};
   const TiffHandle tiff = open(memory, "r");
   const auto refuse = [&] { return DataError("is no readable TIFF: it is damaged"); };
@@ -148,6 +152,7 @@ SpanImage decodeTiff(std::span<const std::uint8_t> bytes) {
   TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_BITSPERSAMPLE, &depth);
   TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, &samples);
   TIFFGetField(tiff.get(), TIFFTAG_PHOTOMETRIC, &meaning);
+  if (check) check(width, height);
   if ((depth != 1 && depth != 8) || samples != 1 || TIFFIsTiled(tiff.get()))
     throw DataError("is a TIFF of another kind: one sample of 1 or 8 bits is wanted, in strips");
   const std::uint32_t flip = depth == 1 && meaning == PHOTOMETRIC_MINISWHITE ? 1 : 0;

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "io/image/size_check.h"
 #include "vdbdither/model/span_image.h"
 
 namespace vdbdither {
@@ -24,6 +25,7 @@ std::vector<std::uint8_t> encodeTiff(const SpanImage& image, const TiffFormat& f
 
 /// The pixels of a TIFF of one bit or of eight with one sample: bits, or what indexes the palette.
 /// Read row by row. Throws DataError in words that go on from the file's name.
-SpanImage decodeTiff(std::span<const std::uint8_t> bytes);
+/// @param check  gets the size before the pixels are read
+SpanImage decodeTiff(std::span<const std::uint8_t> bytes, const SizeCheck& check = {});
 
 }  // namespace vdbdither

@@ -9,18 +9,31 @@
 
 namespace vdbdither {
 
+namespace {
+
+std::string_view withoutMark(std::string_view text) {
+  return text.substr(text.starts_with("\xEF\xBB\xBF") ? 3 : 0);
+}
+
+}  // namespace
+
 std::string_view MeshFile::text() const {
-  return bytes_.substr(bytes_.starts_with("\xEF\xBB\xBF") ? 3 : 0);
+  std::string_view text = withoutMark(bytes());
+  while (!text.empty() && (text.back() == '\0' || text.back() == '\x1A')) text.remove_suffix(1);
+  const std::size_t zero = text.find('\0');
+  if (zero != std::string_view::npos)
+    refuseAtByte(text.data() + zero, "a zero, so this is no text; export it again");
+  return text;
 }
 
 std::string_view MeshFile::start() const {
-  TextCursor text(this->text());
+  TextCursor text(withoutMark(head()));
   text.skipSpace();
-  return {text.position(), bytes_.data() + bytes_.size()};
+  return {text.position(), head().data() + head().size()};
 }
 
 bool MeshFile::isText() const {
-  return bytes_.substr(0, 1024).find('\0') == std::string_view::npos;
+  return head().substr(0, 1024).find('\0') == std::string_view::npos;
 }
 
 bool MeshFile::isNamed(std::string_view ending) const {

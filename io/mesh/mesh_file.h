@@ -7,6 +7,8 @@
 
 #include <openvdb/Types.h>
 
+#include "io/mesh/file_bytes.h"
+
 namespace vdbdither {
 
 /// The content of a mesh file, and how its parser speaks of it: in single lines that start with its
@@ -18,11 +20,24 @@ class MeshFile {
   /// @param warn   called with each warning; may be empty
   MeshFile(std::string name, std::string_view bytes, std::function<void(const std::string&)> warn)
       : name_(std::move(name)), bytes_(bytes), warn_(std::move(warn)) {}
+  /// @param file  must outlive the object
+  MeshFile(FileBytes& file, std::function<void(const std::string&)> warn)
+      : name_(file.path()), bytes_(file.head()), file_(&file), warn_(std::move(warn)) {}
 
-  [[nodiscard]] std::string_view bytes() const { return bytes_; }
-  /// The bytes without the byte order mark of UTF-8.
+  [[nodiscard]] std::size_t size() const {
+    return file_ != nullptr ? file_->size() : bytes_.size();
+  }
+  /// The first bytes, of which `bytes` is a continuation at the same address. What they and the size
+  /// show to be wrong is refused before the file is read.
+  [[nodiscard]] std::string_view head() const { return bytes_; }
+  /// All bytes. The first call reads the file; throws DataError.
+  [[nodiscard]] std::string_view bytes() const {
+    return file_ != nullptr ? file_->all() : bytes_;
+  }
+  /// All bytes without the byte order mark of UTF-8 and without zeros and ^Z at the end, with which
+  /// some systems fill up a text. Refuses zeros elsewhere.
   [[nodiscard]] std::string_view text() const;
-  /// The text without the white space at its beginning.
+  /// The head without a byte order mark and the white space at its beginning.
   [[nodiscard]] std::string_view start() const;
   /// Whether the first KiB holds no zero byte.
   [[nodiscard]] bool isText() const;
@@ -40,7 +55,8 @@ class MeshFile {
   [[nodiscard]] std::string lineOf(const char* position) const;
 
   std::string name_;
-  std::string_view bytes_;
+  std::string_view bytes_;  ///< all of them, or the head of `file_`
+  FileBytes* file_ = nullptr;
   std::function<void(const std::string&)> warn_;
 };
 

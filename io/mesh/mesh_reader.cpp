@@ -2,70 +2,30 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdint>
-#include <fcntl.h>
 #include <limits>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <system_error>
-#include <unistd.h>
 
+#include "io/mesh/file_bytes.h"
 #include "io/mesh/mesh_format.h"
 
 namespace vdbdither {
 
 namespace {
 
-/// A file's bytes, mapped read-only: no copy, and a header that lies costs no memory.
-class MappedFile {
- public:
-  explicit MappedFile(const std::string& path) {
-    // Without O_NONBLOCK a named pipe would block right here.
-    const int file = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    if (file < 0) fail(path, errno == ENOENT ? "no such file" : "cannot be opened: " + reason());
-    struct stat status {};
-    const bool known = ::fstat(file, &status) == 0;
-    size_ = static_cast<std::size_t>(status.st_size);
-    if (known && S_ISREG(status.st_mode) && size_ > 0) {
-      data_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE | MAP_POPULATE, file, 0);
-    }
-    const std::string error = reason();
-    ::close(file);
-    if (!known) fail(path, "cannot be read: " + error);
-    if (S_ISDIR(status.st_mode))
-      fail(path, "a folder; name the meshes in it, as in " +
-                     (std::filesystem::path(path) / "*.stl").string());
-    if (!S_ISREG(status.st_mode)) {
-      fail(path, "a pipe or device; mesh input needs a regular file, save it first");
-    }
-    if (data_ == MAP_FAILED) fail(path, "cannot be read: " + error);
-  }
-  MappedFile(const MappedFile&) = delete;
-  MappedFile& operator=(const MappedFile&) = delete;
-  ~MappedFile() {
-    if (data_ != nullptr) ::munmap(data_, size_);
-  }
-
-  [[nodiscard]] std::string_view bytes() const { return {static_cast<const char*>(data_), size_}; }
-
- private:
-  static std::string reason() { return std::generic_category().message(errno); }
-  [[noreturn]] static void fail(const std::string& path, const std::string& why) {
-    MeshFile(path, {}, {}).refuse(why);
-  }
-
-  void* data_ = nullptr;
-  std::size_t size_ = 0;
-};
-
 struct ForeignFormat {
   std::string_view magic;
   std::string_view name;
 };
 
-/// What is met in the place of a mesh and can be named, told by its first bytes.
+/// Other kinds of files that can be recognized by their first bytes, for the message.
 constexpr std::array foreign_formats{
+    ForeignFormat{"\xFF\xFE", "text in UTF-16"},
+    ForeignFormat{"\xFE\xFF", "text in UTF-16"},
+    ForeignFormat{"\x1F\x8B", "a gzip archive"},
+    ForeignFormat{"<?xml", "XML (AMF, COLLADA or X3D)"},
+    ForeignFormat{"#VRML", "VRML"},
+    ForeignFormat{"# vtk", "VTK"},
+    ForeignFormat{"Kaydara FBX", "FBX"},
     ForeignFormat{"PK\x03\x04", "3MF (or another zip archive)"},
     ForeignFormat{"glTF", "binary glTF (.glb)"},
     ForeignFormat{"{", "glTF (.gltf, or other JSON)"},
@@ -100,7 +60,7 @@ const ForeignFormat* foreignFormatOf(const MeshFile& file) {
 }
 
 const MeshFormat& formatOf(const MeshFile& file) {
-  if (file.bytes().empty()) file.refuse("the file is empty; export it again");
+  if (file.size() == 0) file.refuse("the file is empty; export it again");
   const MeshFormat* best = nullptr;
   MeshMatch surest = MeshMatch::none;
   for (const MeshFormat* format : meshFormats()) {
@@ -129,8 +89,8 @@ Mesh parseMesh(const MeshFile& file) {
 
 Mesh readMesh(const std::filesystem::path& path,
               const std::function<void(const std::string&)>& warn) {
-  const MappedFile file(path.string());
-  return parseMesh(MeshFile(path.string(), file.bytes(), warn));
+  FileBytes file(path.string());
+  return parseMesh(MeshFile(file, warn));
 }
 
 }  // namespace vdbdither

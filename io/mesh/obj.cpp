@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/polygon.h"
 #include "io/mesh/text_cursor.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 
@@ -23,6 +26,9 @@ constexpr std::array<std::string_view, 4> naming{"g", "mtllib", "o", "usemtl"};
 constexpr std::array<std::string_view, 13> immaterial{
     "bevel",      "c_interp",  "d_interp", "l",  "lod", "p", "s",
     "shadow_obj", "trace_obj", "usemap",   "vn", "vp",  "vt"};
+
+/// "fo" is what a face was called before version 2.11.
+bool isFace(std::string_view statement) { return statement == "f" || statement == "fo"; }
 
 template <class Words>
 bool contains(const Words& words, std::string_view word) {
@@ -46,69 +52,119 @@ Vec3d parseVertex(const MeshFile& file, const char* line, TextCursor& text) {
   return position;
 }
 
-/// A corner "v", "v/vt", "v//vn" or "v/vt/vn" as the index of its vertex: from 1 up, or from −1
-/// down from the latest.
-std::uint32_t parseCorner(const MeshFile& file, const char* line, std::string_view corner,
-                          std::size_t vertices) {
-  std::int64_t index = 0;
-  const char* end = corner.data() + corner.size();
-  const auto [stop, error] = std::from_chars(corner.data(), end, index);
-  if (error == std::errc::invalid_argument || (stop != end && *stop != '/')) {
-    file.refuseAtLine(line, inQuotes(corner) + " is not a face corner (v, v/vt, v//vn or v/vt/vn)" +
-                                "; repair the line or export again");
-  }
-  const auto count = static_cast<std::int64_t>(vertices);
-  const bool in_range = error == std::errc() && index != 0 && index <= count && index >= -count;
-  if (!in_range) {
-    file.refuseAtLine(line, "face corner " + inQuotes(corner) +
-                                " is out of range: " + std::to_string(vertices) +
-                                " vertices so far, counted from 1; export it again");
-  }
-  return static_cast<std::uint32_t>(index > 0 ? index - 1 : index + count);
-}
-
 /// Whether the first statement is one of OBJ's, or there are only comments.
 bool looksLikeObj(std::string_view bytes) {
-  for (TextCursor text(bytes); !text.atEnd(); text.skipLine()) {
+  for (TextCursor text(bytes, TextCursor::Comments::hash); !text.atEnd(); text.skipLine()) {
     const std::string_view word = text.word();
-    if (word.empty() || word.starts_with('#')) continue;
-    return word == "v" || word == "f" || contains(naming, word) || contains(immaterial, word);
+    if (word.empty()) continue;
+    return word == "v" || isFace(word) || contains(naming, word) || contains(immaterial, word);
   }
   return true;
 }
 
-Mesh readObj(const MeshFile& file) {
-  Mesh mesh;
-  PolygonCollector polygons(file, mesh);
-  std::vector<std::uint32_t> corners;
-  std::size_t ignored = 0;
-  const char* first_ignored = nullptr;
-  TextCursor text(file.text());
-  for (; !text.atEnd(); text.skipLine()) {
-    const char* line = text.position();
-    const std::string_view statement = text.word();
-    if (statement.empty() || statement.starts_with('#') || contains(naming, statement)) continue;
+class ObjReader {
+ public:
+  explicit ObjReader(const MeshFile& file)
+      : file_(file), polygons_(file, mesh_), text_(file.text(), TextCursor::Comments::hash) {}
+
+  Mesh read() {
+    constexpr std::size_t lines_per_look = 1 << 16;
+    for (std::size_t line = 0; !text_.atEnd(); text_.skipLine()) {
+      if (++line % lines_per_look == 0) throwIfInterrupted();
+      readStatement();
+    }
+    addWaitingFaces();
+    polygons_.finish();
+    if (ignored_ > 0) {
+      file_.warnAtLine(first_ignored_, "ignored " + std::to_string(ignored_) +
+                                           " statements that are not polygons, from here on");
+    }
+    return std::move(mesh_);
+  }
+
+ private:
+  /// A face that names vertices which the file has further on.
+  struct WaitingFace {
+    const char* line;
+    std::size_t end;  ///< of its corners, in waiting_corners_
+  };
+
+  void readStatement() {
+    const char* line = text_.position();
+    const std::string_view statement = text_.word();
+    if (statement.empty() || contains(naming, statement)) return;
     if (statement == "v") {
-      mesh.vertices.push_back(parseVertex(file, line, text));
-    } else if (statement == "f") {
-      corners.clear();
-      for (auto corner = text.word(); !corner.empty(); corner = text.word()) {
-        corners.push_back(parseCorner(file, line, corner, mesh.vertices.size()));
-      }
-      polygons.add(corners, line);
-    } else if (!contains(immaterial, statement) && ignored++ == 0) {
-      first_ignored = line;
+      mesh_.vertices.push_back(parseVertex(file_, line, text_));
+    } else if (isFace(statement)) {
+      readFace(line);
+    } else if (!contains(immaterial, statement) && ignored_++ == 0) {
+      first_ignored_ = line;
     }
     // What is left of the line may be continued on the next.
-    while (!text.word().empty()) continue;
+    while (!text_.word().empty()) continue;
   }
-  polygons.finish();
-  if (ignored > 0) {
-    file.warnAtLine(first_ignored, "ignored " + std::to_string(ignored) +
-                                       " statements that are not polygons, from here on");
+
+  void readFace(const char* line) {
+    corners_.clear();
+    bool waits = !waiting_.empty();
+    for (auto word = text_.word(); !word.empty(); word = text_.word()) {
+      corners_.push_back(parseCorner(line, word));
+      waits = waits || corners_.back() >= mesh_.vertices.size();
+    }
+    if (!waits) return polygons_.add(corners_, line);
+    waiting_corners_.insert(waiting_corners_.end(), corners_.begin(), corners_.end());
+    waiting_.push_back({line, waiting_corners_.size()});
   }
-  return mesh;
-}
+
+  /// A corner "v", "v/vt", "v//vn" or "v/vt/vn" as the index of its vertex: from 1 up, or from −1
+  /// down from the latest.
+  [[nodiscard]] std::uint32_t parseCorner(const char* line, std::string_view corner) const {
+    std::int64_t index = 0;
+    const char* end = corner.data() + corner.size();
+    const auto [stop, error] = std::from_chars(corner.data(), end, index);
+    if (error == std::errc::invalid_argument || (stop != end && *stop != '/')) {
+      file_.refuseAtLine(line, inQuotes(corner) +
+                                   " is not a face corner (v, v/vt, v//vn or v/vt/vn)" +
+                                   "; repair the line or export again");
+    }
+    constexpr std::int64_t maximum = 0xFFFFFFFF;
+    const auto count = static_cast<std::int64_t>(mesh_.vertices.size());
+    if (error != std::errc() || index == 0 || index > maximum || index < -count) {
+      file_.refuseAtLine(line, "face corner " + inQuotes(corner) + " is out of range: " +
+                                   std::to_string(mesh_.vertices.size()) +
+                                   " vertices so far, counted from 1; export it again");
+    }
+    return static_cast<std::uint32_t>(index > 0 ? index - 1 : index + count);
+  }
+
+  void addWaitingFaces() {
+    std::size_t begin = 0;
+    for (const WaitingFace& face : waiting_) {
+      const std::span corners(waiting_corners_.data() + begin, face.end - begin);
+      for (const std::uint32_t corner : corners) {
+        if (corner < mesh_.vertices.size()) continue;
+        file_.refuseAtLine(face.line, "face corner '" + std::to_string(std::uint64_t{corner} + 1) +
+                                          "' is out of range: the file has " +
+                                          std::to_string(mesh_.vertices.size()) +
+                                          " vertices, counted from 1; export it again");
+      }
+      polygons_.add(corners, face.line);
+      begin = face.end;
+    }
+  }
+
+  const MeshFile& file_;
+  Mesh mesh_;
+  PolygonCollector polygons_;
+  TextCursor text_;
+  std::vector<std::uint32_t> corners_;
+  std::vector<WaitingFace> waiting_;
+  std::vector<std::uint32_t> waiting_corners_;
+  std::size_t ignored_ = 0;
+  const char* first_ignored_ = nullptr;
+};
+
+Mesh readObj(const MeshFile& file) { return ObjReader(file).read(); }
 
 MeshMatch matchObj(const MeshFile& file) {
   if (!file.isText()) return MeshMatch::none;

@@ -14,6 +14,8 @@
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/polygon.h"
 #include "io/mesh/text_cursor.h"
+#include "io/mesh/unread_bytes.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 
@@ -23,7 +25,7 @@ namespace {
 /// vertices have besides a position: texture coordinates, a colour, a normal, more coordinates.
 std::string_view offKeyword(std::string_view text) {
   std::size_t length = 0;
-  while (!text.substr(length).starts_with("OFF")) {
+  while (!equalsIgnoringCase(text.substr(length, 3), "off")) {
     const std::string_view rest = text.substr(length);
     if (rest.starts_with("ST")) {
       length += 2;
@@ -45,58 +47,73 @@ MeshMatch matchOff(const MeshFile& file) {
   return file.isText() && file.isNamed(".off") ? MeshMatch::name : MeshMatch::none;
 }
 
+/// Reads by lines where each line is a vertex or a face, and by words otherwise.
 class OffReader {
  public:
   explicit OffReader(const MeshFile& file)
-      : file_(file), text_(file.text()), polygons_(file, mesh_) {}
+      : file_(file), text_(file.start(), TextCursor::Comments::hash), polygons_(file, mesh_) {}
 
   Mesh read() {
     readHeader();
-    // What the header says is no reason to allocate: a vertex takes six bytes of text.
+    // The count of a header alone must not decide how much is allocated: a vertex takes six bytes.
     mesh_.vertices.reserve(std::min(vertices_, bytesLeft() / 6 + 1));
+    by_lines_ = hasLines(vertices_ + faces_);
     for (std::uint64_t i = 0; i < vertices_; ++i) {
-      beginLine("vertex", i + 1);
+      begin("vertex", i + 1);
       readVertex();
     }
+    by_lines_ = by_lines_ || hasLines(faces_);
     for (std::uint64_t i = 0; i < faces_; ++i) {
-      beginLine("face", i + 1);
+      begin("face", i + 1);
       readFace();
     }
+    text_.skipSpace();
+    judgeUnread(file_, mesh_, {text_.position(), bytesLeft()}, "the last face");
     polygons_.finish();
-    skipToWord();
-    if (bytesLeft() > 0)
-      file_.warn("ignored " + std::to_string(bytesLeft()) + " bytes after the last face");
     return std::move(mesh_);
   }
 
  private:
   /// The keyword may be missing, and the counts may follow it at once.
   void readHeader() {
-    beginLine("the header", 0);
-    const std::string_view rest(text_.position(), bytesLeft());
-    const std::string_view keyword = offKeyword(rest);
+    begin("the header", 0);
+    const std::string_view keyword = offKeyword(file_.start());
     if (keyword.find_first_of("4n") != std::string_view::npos)
       refuse("announces vertices that do not have three coordinates");
-    text_ = TextCursor(rest.substr(keyword.size()));
-    beginLine("the header", 0);
+    const auto has = [&](char letter) { return keyword.find(letter) != std::string_view::npos; };
+    more_numbers_ = (has('S') ? 2 : 0) + (has('C') ? 4 : 0) + (has('N') ? 3 : 0);
+    text_ = TextCursor(file_.start().substr(keyword.size()), TextCursor::Comments::hash);
+    begin("the header", 0);
+    by_lines_ = false;
     const auto vertices = wholeNumber();
     const auto faces = wholeNumber();
+    by_lines_ = true;
     if (!vertices || !faces) refuse("must count vertices and faces; binary OFF is not read");
-    if (*vertices > 0xFFFFFFFE) refuse("counts more than 4294967294 vertices");
+    wholeNumber();  // the edges, which may be missing
     vertices_ = *vertices;
     faces_ = *faces;
-    text_.skipLine();
+    if (vertices_ > 0xFFFFFFFE) refuse("counts more than 4294967294 vertices");
+    // "0 0 0" and "0", each with a blank, which the last need not have. Of a short file the lines
+    // tell better what is wrong.
+    const std::uint64_t left = bytesLeft() + 1;
+    if (file_.size() > file_.head().size() &&
+        (vertices_ > left / 6 || faces_ > (left - 6 * vertices_) / 2))
+      refuse("counts " + std::to_string(vertices_) + " vertices and " + std::to_string(faces_) +
+             " faces, more than the file holds: it is cut off");
+    const std::string_view bytes = file_.bytes();
+    text_ = TextCursor(bytes.substr(static_cast<std::size_t>(text_.position() - bytes.data())),
+                       TextCursor::Comments::hash);
   }
 
   void readVertex() {
-    const auto x = text_.number();
-    const auto y = x ? text_.number() : x;
-    const auto z = y ? text_.number() : y;
+    const auto x = number();
+    const auto y = x ? number() : x;
+    const auto z = y ? number() : y;
     if (!z) refuse("must have three coordinates");
     const openvdb::Vec3d position(*x, *y, *z);
     if (!isFinite(position)) refuse("is not finite (" + shown(position) + ")");
     mesh_.vertices.push_back(position);
-    text_.skipLine();  // a normal, a colour, texture coordinates
+    skipRest(more_numbers_);  // a normal, a colour, texture coordinates
   }
 
   void readFace() {
@@ -112,37 +129,60 @@ class OffReader {
       corners_.push_back(static_cast<std::uint32_t>(*corner));
     }
     polygons_.add(corners_, line_);
-    text_.skipLine();  // a colour
+    skipRest(0);  // a colour
   }
 
-  /// Goes to the line of an element, which messages then name.
+  /// Goes to the begin of an element, which messages then name.
   /// @param index  counted from 1, or 0 where there is only one
-  void beginLine(const char* element, std::uint64_t index) {
-    skipToWord();
+  void begin(const char* element, std::uint64_t index) {
+    constexpr std::uint64_t elements_per_look = 1 << 16;
+    if (index % elements_per_look == 0) throwIfInterrupted();
+    text_.skipSpace();
     line_ = text_.position();
     element_ = element;
     index_ = index;
     if (text_.atEnd()) refuse("is missing: the file is cut off here");
   }
 
-  /// Passes over white space and comments.
-  void skipToWord() {
-    for (text_.skipSpace(); !text_.atEnd() && *text_.position() == '#'; text_.skipSpace())
-      text_.skipLine();
+  /// Ends an element: passes over the rest of its line, or over as many numbers.
+  void skipRest(int numbers) {
+    if (by_lines_) return text_.skipLine();
+    for (; numbers > 0; --numbers)
+      if (!number()) refuse("must have what the keyword announces");
   }
 
-  /// Returns the whole number that is the next word of the line, or nothing.
+  /// Whether the rest of the file has as many lines, without empty ones and comments.
+  [[nodiscard]] bool hasLines(std::uint64_t count) const {
+    TextCursor text = text_;
+    std::uint64_t lines = 0;
+    for (text.skipSpace(); !text.atEnd() && lines <= count; text.skipSpace()) {
+      text.skipLine();
+      ++lines;
+    }
+    return lines == count;
+  }
+
+  /// Returns the next number, of this line if lines matter, or nothing.
+  std::optional<double> number() {
+    if (!by_lines_) text_.skipSpace();
+    return text_.number();
+  }
+
+  /// The same for a whole number.
   std::optional<std::uint64_t> wholeNumber() {
-    const std::string_view word = text_.word();
+    if (!by_lines_) text_.skipSpace();
+    TextCursor behind = text_;
+    const std::string_view word = behind.word();
     std::uint64_t value = 0;
     const char* end = word.data() + word.size();
     const auto [stop, error] = std::from_chars(word.data(), end, value);
     if (word.empty() || error != std::errc() || stop != end) return std::nullopt;
+    text_ = behind;
     return value;
   }
 
   [[nodiscard]] std::size_t bytesLeft() const {
-    return static_cast<std::size_t>(file_.bytes().data() + file_.bytes().size() - text_.position());
+    return static_cast<std::size_t>(file_.head().data() + file_.size() - text_.position());
   }
 
   [[noreturn]] void refuse(const std::string& why) const {
@@ -158,6 +198,8 @@ class OffReader {
   std::vector<std::uint32_t> corners_;
   std::uint64_t vertices_ = 0;
   std::uint64_t faces_ = 0;
+  int more_numbers_ = 0;  ///< of a vertex, as the keyword announces them
+  bool by_lines_ = true;
   const char* line_ = nullptr;
   const char* element_ = "";
   std::uint64_t index_ = 0;

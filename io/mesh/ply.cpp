@@ -12,8 +12,11 @@
 #include <vector>
 
 #include "io/mesh/mesh_format.h"
+#include "io/mesh/ply_header.h"
 #include "io/mesh/polygon.h"
 #include "io/mesh/text_cursor.h"
+#include "io/mesh/unread_bytes.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 
@@ -21,201 +24,79 @@ using openvdb::Vec3d;
 
 namespace {
 
-enum class Scalar { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
-enum class Encoding { kAscii, kLittleEndian, kBigEndian };
-
-std::size_t sizeOf(Scalar type) {
-  constexpr std::array<std::size_t, 8> sizes{1, 1, 2, 2, 4, 4, 4, 8};
-  return sizes[static_cast<std::size_t>(type)];
-}
-
-struct Property {
-  std::string name;
-  Scalar type = Scalar::kFloat32;
-  std::optional<Scalar> count_type;  ///< set for a list
-};
-
-struct Element {
-  std::string name;
-  std::uint64_t count = 0;
-  std::vector<Property> properties;
-
-  /// The position of the property with one of these names, or −1.
-  [[nodiscard]] int find(std::initializer_list<std::string_view> names) const {
-    for (std::size_t i = 0; i < properties.size(); ++i) {
-      if (std::find(names.begin(), names.end(), properties[i].name) != names.end()) {
-        return static_cast<int>(i);
-      }
-    }
-    return -1;
-  }
-};
-
-struct Header {
-  Encoding encoding = Encoding::kAscii;
-  std::vector<Element> elements;
-  std::string_view body;
-};
-
-class HeaderParser {
- public:
-  explicit HeaderParser(const MeshFile& file) : file_(file), text_(file.bytes()) {}
-
-  Header parse() {
-    text_.skipLine();
-    bool has_format = false;
-    for (;; text_.skipLine()) {
-      line_ = text_.position();
-      if (text_.atEnd()) refuse("cut off: the header has no 'end_header'; export it again");
-      const std::string_view keyword = text_.word();
-      if (keyword == "format") {
-        header_.encoding = parseEncoding();
-        has_format = true;
-      } else if (keyword == "element") {
-        parseElement();
-      } else if (keyword == "property") {
-        parseProperty();
-      } else if (keyword == "end_header") {
-        break;
-      } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
-        refuse(inQuotes(keyword) + " is no keyword of a PLY header; export it again");
-      }
-    }
-    if (!has_format) refuse("the header has no 'format'; export it again");
-    header_.body = file_.bytes().substr(bodyOffset());
-    return std::move(header_);
-  }
-
- private:
-  [[noreturn]] void refuse(const std::string& why) const { file_.refuseAtLine(line_, why); }
-
-  Encoding parseEncoding() {
-    const std::string_view name = text_.word();
-    if (text_.word() == "1.0") {
-      if (name == "ascii") return Encoding::kAscii;
-      if (name == "binary_little_endian") return Encoding::kLittleEndian;
-      if (name == "binary_big_endian") return Encoding::kBigEndian;
-    }
-    refuse(
-        "the format is not 'ascii 1.0', 'binary_little_endian 1.0' or 'binary_big_endian 1.0'; "
-        "export it again");
-  }
-
-  void parseElement() {
-    Element element;
-    element.name = text_.word();
-    const std::string_view count = text_.word();
-    const char* end = count.data() + count.size();
-    const auto [stop, error] = std::from_chars(count.data(), end, element.count);
-    if (count.empty() || error != std::errc() || stop != end) {
-      refuse("element " + inQuotes(element.name) + " has no count; export it again");
-    }
-    for (const Element& other : header_.elements) {
-      if (other.name == element.name) {
-        refuse("element " + inQuotes(element.name) + " is declared twice; export it again");
-      }
-    }
-    header_.elements.push_back(std::move(element));
-  }
-
-  void parseProperty() {
-    if (header_.elements.empty()) refuse("a property before any element; export it again");
-    Property property;
-    std::string_view type = text_.word();
-    if (type == "list") {
-      property.count_type = parseScalar(text_.word());
-      type = text_.word();
-    }
-    property.type = parseScalar(type);
-    property.name = text_.word();
-    if (property.name.empty()) refuse("a property has no name; export it again");
-    header_.elements.back().properties.push_back(std::move(property));
-  }
-
-  [[nodiscard]] Scalar parseScalar(std::string_view name) const {
-    constexpr std::array<std::array<std::string_view, 2>, 8> names{{{"char", "int8"},
-                                                                    {"uchar", "uint8"},
-                                                                    {"short", "int16"},
-                                                                    {"ushort", "uint16"},
-                                                                    {"int", "int32"},
-                                                                    {"uint", "uint32"},
-                                                                    {"float", "float32"},
-                                                                    {"double", "float64"}}};
-    for (std::size_t type = 0; type < names.size(); ++type) {
-      if (name == names[type][0] || name == names[type][1]) return static_cast<Scalar>(type);
-    }
-    refuse(inQuotes(name) + " is no scalar type of PLY; export it again");
-  }
-
-  /// The body may itself start with a byte that looks like the end of a line, so the one that ends
-  /// the header is taken to be of the kind that ends the first line.
-  [[nodiscard]] std::size_t bodyOffset() const {
-    const std::string_view bytes = file_.bytes();
-    const auto end = static_cast<std::size_t>(text_.position() - bytes.data());
-    const bool two_bytes = bytes.starts_with("ply\r\n") && bytes.substr(end, 2) == "\r\n";
-    return std::min(end + (two_bytes ? 2 : 1), bytes.size());
-  }
-
-  const MeshFile& file_;
-  TextCursor text_;
-  const char* line_ = nullptr;
-  Header header_;
-};
-
-/// Reads the scalars of the body one after another, whatever their encoding.
+/// Reads the scalars of the body one after another, whatever their encoding. A text is read by
+/// lines where each of its lines is an element, and by words otherwise.
 class Body {
  public:
-  Body(const MeshFile& file, Encoding encoding, std::string_view bytes)
-      : file_(file),
-        encoding_(encoding),
-        at_(bytes.data()),
-        end_(bytes.data() + bytes.size()),
-        text_(bytes) {}
+  Body(const MeshFile& file, const PlyHeader& header)
+      : file_(&file),
+        encoding_(header.encoding),
+        at_(file.bytes().data() + header.body),
+        end_(file.bytes().data() + file.size()),
+        text_({at_, end_}),
+        by_lines_(isByLines(header)) {}
 
   /// Starts with element number `index`, counted from 0; messages name it.
-  void enter(const Element& element, std::uint64_t index) {
+  void enter(const PlyElement& element, std::uint64_t index) {
+    constexpr std::uint64_t elements_per_look = 1 << 16;
+    if (index % elements_per_look == 0) throwIfInterrupted();
     element_ = &element;
     index_ = index;
+    if (encoding_ == PlyEncoding::kAscii) skipRemarks(text_);
   }
 
-  double next(Scalar type) {
-    if (encoding_ == Encoding::kAscii) return nextNumber();
-    if (static_cast<std::size_t>(end_ - at_) < sizeOf(type)) refuseCutOff();
+  /// Ends with the element. Some writers put more on its line than the header declares.
+  void leave() {
+    if (!by_lines_) return;
+    text_.skipBlanks();
+    if (text_.atLineEnd()) return;
+    if (longer_lines_++ == 0) first_longer_line_ = text_.position();
+    text_.skipLine();
+  }
+
+  double next(PlyScalar type) {
+    if (encoding_ == PlyEncoding::kAscii) return nextNumber();
+    if (left() < sizeOf(type)) refuseCutOff();
     switch (type) {
-      case Scalar::kInt8:
+      case PlyScalar::kInt8:
         return take<std::int8_t, std::uint8_t>();
-      case Scalar::kUint8:
+      case PlyScalar::kUint8:
         return take<std::uint8_t, std::uint8_t>();
-      case Scalar::kInt16:
+      case PlyScalar::kInt16:
         return take<std::int16_t, std::uint16_t>();
-      case Scalar::kUint16:
+      case PlyScalar::kUint16:
         return take<std::uint16_t, std::uint16_t>();
-      case Scalar::kInt32:
+      case PlyScalar::kInt32:
         return take<std::int32_t, std::uint32_t>();
-      case Scalar::kUint32:
+      case PlyScalar::kUint32:
         return take<std::uint32_t, std::uint32_t>();
-      case Scalar::kFloat32:
+      case PlyScalar::kInt64:
+        return static_cast<double>(take<std::int64_t, std::uint64_t>());
+      case PlyScalar::kUint64:
+        return static_cast<double>(take<std::uint64_t, std::uint64_t>());
+      case PlyScalar::kFloat32:
         return take<float, std::uint32_t>();
-      case Scalar::kFloat64:
+      case PlyScalar::kFloat64:
         break;
     }
     return take<double, std::uint64_t>();
   }
 
-  /// The length of the list that follows; its items are known to fit into what is left of the file.
-  std::uint64_t nextCount(const Property& list) {
+  /// Reads the length of the list that follows. Throws unless the items fit into the rest of the
+  /// file.
+  std::uint64_t nextCount(const PlyProperty& list) {
     const double count = next(*list.count_type);
     if (!(count >= 0) || count != std::floor(count)) {
       refuse("the list " + inQuotes(list.name) + " has a length that is no count");
     }
-    const std::uint64_t held = left() / (encoding_ == Encoding::kAscii ? 1 : sizeOf(list.type));
+    const std::uint64_t held = left() / (encoding_ == PlyEncoding::kAscii ? 1 : sizeOf(list.type));
     if (count > static_cast<double>(held)) refuseCutOff();
     return static_cast<std::uint64_t>(count);
   }
 
-  void skip(const Property& property) {
+  void skip(const PlyProperty& property) {
     std::uint64_t count = property.count_type ? nextCount(property) : 1;
-    if (encoding_ != Encoding::kAscii) {
+    if (encoding_ != PlyEncoding::kAscii) {
       if (left() < count * sizeOf(property.type)) refuseCutOff();
       at_ += count * sizeOf(property.type);
       return;
@@ -224,49 +105,84 @@ class Body {
   }
 
   /// Passes over all of `element`.
-  void skipAll(const Element& element) {
+  void skipAll(const PlyElement& element) {
     for (std::uint64_t i = 0; i < element.count && !element.properties.empty(); ++i) {
       enter(element, i);
-      for (const Property& property : element.properties) skip(property);
+      for (const PlyProperty& property : element.properties) skip(property);
+      leave();
     }
   }
 
-  void warnOfRest() {
-    if (encoding_ == Encoding::kAscii) text_.skipSpace();
-    if (left() > 0) {
-      file_.warn("ignored " + std::to_string(left()) + " bytes after the last element");
-    }
+  /// What follows the last element.
+  std::string_view rest() {
+    if (encoding_ == PlyEncoding::kAscii) skipRemarks(text_);
+    return {position(), end_};
+  }
+
+  void warnOfLongerLines() const {
+    if (longer_lines_ == 0) return;
+    file_->warnAtLine(first_longer_line_, "ignored what " + std::to_string(longer_lines_) +
+                                              " lines, from here on, have behind the properties "
+                                              "that the header declares");
   }
 
   [[nodiscard]] const char* position() const {
-    return encoding_ == Encoding::kAscii ? text_.position() : at_;
+    return encoding_ == PlyEncoding::kAscii ? text_.position() : at_;
   }
 
-  /// How many of `element` there can be in the rest of the file: what a header says is no reason to
-  /// allocate.
-  [[nodiscard]] std::uint64_t atMost(const Element& element) const {
-    std::uint64_t least = 0;
-    for (const Property& property : element.properties) {
-      least +=
-          encoding_ == Encoding::kAscii ? 1 : sizeOf(property.count_type.value_or(property.type));
-    }
-    return std::min(element.count, left() / std::max<std::uint64_t>(least, 1));
+  /// Returns the maximum number of `element` in the rest of the file. The count of a header alone
+  /// must not decide how much memory is allocated.
+  [[nodiscard]] std::uint64_t atMost(const PlyElement& element) const {
+    return std::min(element.count,
+                    left() / std::max<std::uint64_t>(element.leastBytes(encoding_), 1) + 1);
   }
 
   [[noreturn]] void refuse(const std::string& why) const {
     const std::string what = element_->name + " " + std::to_string(index_ + 1) + " of " +
                              std::to_string(element_->count) + ": " + why;
-    if (encoding_ == Encoding::kAscii) file_.refuseAtLine(text_.position(), what);
-    file_.refuseAtByte(at_, what);
+    if (encoding_ == PlyEncoding::kAscii) file_->refuseAtLine(text_.position(), what);
+    file_->refuseAtByte(at_, what);
   }
 
  private:
+  /// Goes to the next line that is neither empty nor a comment.
+  static void skipRemarks(TextCursor& text) {
+    for (;;) {
+      text.skipSpace();
+      TextCursor ahead = text;
+      const std::string_view word = ahead.word();
+      if (word != "comment" && word != "obj_info" && !word.starts_with('#')) return;
+      text.skipLine();
+    }
+  }
+
+  /// Whether the text has as many such lines as there are elements.
+  [[nodiscard]] bool isByLines(const PlyHeader& header) const {
+    if (encoding_ != PlyEncoding::kAscii) return false;
+    std::uint64_t elements = 0;
+    for (const PlyElement& element : header.elements)
+      if (!element.properties.empty()) elements += element.count;
+    std::uint64_t lines = 0;
+    TextCursor text({at_, end_});
+    for (skipRemarks(text); !text.atEnd() && lines <= elements; skipRemarks(text)) {
+      text.skipLine();
+      ++lines;
+    }
+    return lines == elements;
+  }
+
   [[nodiscard]] std::uint64_t left() const { return static_cast<std::uint64_t>(end_ - position()); }
   [[noreturn]] void refuseCutOff() const { refuse("cut off here; export or download it again"); }
 
   double nextNumber() {
-    text_.skipSpace();
-    if (text_.atEnd()) refuseCutOff();
+    if (by_lines_) {
+      text_.skipBlanks();
+      if (text_.atLineEnd())
+        refuse("its line has fewer numbers than it should; export or download it again");
+    } else {
+      text_.skipSpace();
+      if (text_.atEnd()) refuseCutOff();
+    }
     const auto value = text_.number();
     if (!value) refuse(inQuotes(text_.word()) + " is not a number; export it again");
     return *value;
@@ -274,45 +190,53 @@ class Body {
 
   template <class Value, class Bits>
   Value take() {
-    std::uint64_t bits = 0;
-    for (std::size_t byte = 0; byte < sizeof(Bits); ++byte) {
-      const std::uint64_t value = static_cast<unsigned char>(at_[byte]);
-      const std::size_t rank =
-          encoding_ == Encoding::kLittleEndian ? byte : sizeof(Bits) - 1 - byte;
-      bits |= value << 8 * rank;
-    }
+    const std::uint64_t bits = bitsAt(at_, sizeof(Bits), encoding_);
     at_ += sizeof(Bits);
     return std::bit_cast<Value>(static_cast<Bits>(bits));
   }
 
-  const MeshFile& file_;
-  Encoding encoding_;
+  const MeshFile* file_;
+  PlyEncoding encoding_;
   const char* at_;
   const char* end_;
   TextCursor text_;
-  const Element* element_ = nullptr;
+  bool by_lines_;
+  const PlyElement* element_ = nullptr;
   std::uint64_t index_ = 0;
+  std::uint64_t longer_lines_ = 0;
+  const char* first_longer_line_ = nullptr;
 };
 
 class BodyParser {
  public:
-  BodyParser(const MeshFile& file, const Header& header)
-      : body_(file, header.encoding, header.body), polygons_(file, mesh_) {}
+  BodyParser(const MeshFile& file, const PlyHeader& header)
+      : file_(file), body_(file, header), polygons_(file, mesh_) {}
 
-  Mesh parse(const MeshFile& file, const Header& header) {
-    for (const Element& element : header.elements) {
-      if (element.name == "vertex") {
-        parseVertices(file, element);
-      } else if (element.name == "face") {
-        parseLists(file, element,
-                   [this](const char* position) { polygons_.add(corners_, position); });
-      } else if (element.name == "tristrips") {
-        parseLists(file, element, [this](const char*) { addStrips(); });
+  Mesh parse(const PlyHeader& header) {
+    const auto vertices =
+        std::find_if(header.elements.begin(), header.elements.end(),
+                     [](const PlyElement& element) { return element.name == "vertex"; });
+    std::vector<std::pair<const PlyElement*, Body>> waiting;  // faces before their vertices
+    for (auto element = header.elements.begin(); element != header.elements.end(); ++element) {
+      if (element == vertices) {
+        parseVertices(*element);
+        const Body after = body_;
+        for (const auto& [faces, body] : waiting) {
+          body_ = body;
+          parseFaces(*faces);
+        }
+        body_ = after;
+      } else if (isFaces(*element) && element < vertices && vertices != header.elements.end()) {
+        waiting.emplace_back(&*element, body_);
+        body_.skipAll(*element);
+      } else if (isFaces(*element)) {
+        parseFaces(*element);
       } else {
-        body_.skipAll(element);
+        body_.skipAll(*element);
       }
     }
-    body_.warnOfRest();
+    body_.warnOfLongerLines();
+    judgeUnread(file_, mesh_, body_.rest(), "the last element");
     polygons_.finish();
     return std::move(mesh_);
   }
@@ -320,22 +244,26 @@ class BodyParser {
  private:
   static constexpr std::uint32_t restart = 0xFFFFFFFF;
 
-  void parseVertices(const MeshFile& file, const Element& element) {
+  static bool isFaces(const PlyElement& element) {
+    return element.name == "face" || element.name == "tristrips";
+  }
+
+  void parseVertices(const PlyElement& element) {
     const std::array<int, 3> axes{element.find({"x"}), element.find({"y"}), element.find({"z"})};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (axes[axis] < 0 || element.properties[static_cast<std::size_t>(axes[axis])].count_type) {
-        file.refuse(std::string("the vertices have no scalar property '") + "xyz"[axis] +
-                    "'; export it again");
+        file_.refuse(std::string("the vertices have no scalar property '") + "xyz"[axis] +
+                     "'; export it again");
       }
     }
-    if (element.count >= restart) file.refuse("more than 4294967294 vertices; split the part");
+    if (element.count >= restart) file_.refuse("more than 4294967294 vertices; split the part");
     mesh_.vertices.reserve(body_.atMost(element));
     for (std::uint64_t i = 0; i < element.count; ++i) {
       body_.enter(element, i);
       Vec3d position(0.0);
       for (int p = 0; p < static_cast<int>(element.properties.size()); ++p) {
         const auto axis = std::find(axes.begin(), axes.end(), p);
-        const Property& property = element.properties[static_cast<std::size_t>(p)];
+        const PlyProperty& property = element.properties[static_cast<std::size_t>(p)];
         if (axis == axes.end()) {
           body_.skip(property);
         } else {
@@ -346,32 +274,38 @@ class BodyParser {
         body_.refuse("the vertex is not finite (" + shown(position) + "); repair the mesh");
       }
       mesh_.vertices.push_back(position);
+      body_.leave();
     }
   }
 
-  template <class Add>
-  void parseLists(const MeshFile& file, const Element& element, const Add& add) {
+  void parseFaces(const PlyElement& element) {
+    const bool are_strips = element.name == "tristrips";
     if (element.count == 0) return;
     const int list = element.find({"vertex_indices", "vertex_index"});
     if (list < 0 || !element.properties[static_cast<std::size_t>(list)].count_type) {
-      file.refuse("element '" + element.name + "' has no list 'vertex_indices'; export it again");
+      file_.refuse("element '" + element.name + "' has no list 'vertex_indices'; export it again");
     }
     for (std::uint64_t i = 0; i < element.count; ++i) {
       body_.enter(element, i);
       const char* position = body_.position();
       for (int p = 0; p < static_cast<int>(element.properties.size()); ++p) {
-        const Property& property = element.properties[static_cast<std::size_t>(p)];
+        const PlyProperty& property = element.properties[static_cast<std::size_t>(p)];
         if (p == list) {
-          parseCorners(property, element.name == "tristrips");
+          parseCorners(property, are_strips);
         } else {
           body_.skip(property);
         }
       }
-      add(position);
+      if (are_strips) {
+        addStrips();
+      } else {
+        polygons_.add(corners_, position);
+      }
+      body_.leave();
     }
   }
 
-  void parseCorners(const Property& list, bool with_restarts) {
+  void parseCorners(const PlyProperty& list, bool with_restarts) {
     corners_.clear();
     for (std::uint64_t count = body_.nextCount(list); count > 0; --count) {
       const double index = body_.next(list.type);
@@ -382,7 +316,7 @@ class BodyParser {
       if (!(index >= 0) || index >= static_cast<double>(mesh_.vertices.size()) ||
           index != std::floor(index)) {
         body_.refuse("a vertex index is out of range: " + std::to_string(mesh_.vertices.size()) +
-                     " vertices before the faces, counted from 0; export it again");
+                     " vertices, counted from 0; export it again");
       }
       corners_.push_back(static_cast<std::uint32_t>(index));
     }
@@ -407,6 +341,7 @@ class BodyParser {
     }
   }
 
+  const MeshFile& file_;
   Body body_;
   Mesh mesh_;
   PolygonCollector polygons_;
@@ -414,14 +349,15 @@ class BodyParser {
 };
 
 Mesh readPly(const MeshFile& file) {
-  const Header header = HeaderParser(file).parse();
-  return BodyParser(file, header).parse(file, header);
+  const PlyHeader header = parsePlyHeader(file);
+  return BodyParser(file, header).parse(header);
 }
 
 MeshMatch matchPly(const MeshFile& file) {
-  const std::string_view bytes = file.bytes();
-  const bool is_ply = bytes.starts_with("ply\n") || bytes.starts_with("ply\r");
-  return is_ply ? MeshMatch::signature : MeshMatch::none;
+  TextCursor text(file.head());
+  const bool is_ply = text.word() == "ply" && text.position() == file.head().data() + 3;
+  text.skipBlanks();
+  return is_ply && text.atLineEnd() && !text.atEnd() ? MeshMatch::signature : MeshMatch::none;
 }
 
 /// Binary and little-endian.

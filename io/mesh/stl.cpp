@@ -7,10 +7,17 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/text_cursor.h"
+#include "io/mesh/unread_bytes.h"
+#include "io/mesh/vertex_welder.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 
@@ -22,6 +29,7 @@ namespace {
 constexpr std::size_t header_size = 84;
 constexpr std::size_t facet_size = 50;
 constexpr std::size_t normal_size = 12;
+constexpr std::size_t triangles_per_look = 1 << 16;  ///< between looks at signals
 
 std::uint32_t littleEndian32(const char* at) {
   std::uint32_t value = 0;
@@ -31,227 +39,410 @@ std::uint32_t littleEndian32(const char* at) {
   return value;
 }
 
+std::size_t littleEndian16(const char* at) {
+  return static_cast<std::size_t>(static_cast<unsigned char>(at[0]) |
+                                  static_cast<unsigned char>(at[1]) << 8);
+}
+
 double littleEndianFloat(const char* at) { return std::bit_cast<float>(littleEndian32(at)); }
 
-/// Gives corners at the same position one vertex, in the order of first appearance. An
-/// open-addressing table of (hash, vertex), at most half full. Corners are looked up in batches, so
-/// that the memory they need is on its way before it is touched.
-class Welder {
+/// How the records of a binary STL may lie in its file.
+struct RecordLayout {
+  struct Block {
+    std::size_t header;  ///< where its header begins
+    std::size_t count;   ///< of its records
+  };
+
+  std::vector<Block> blocks;    ///< more than one in files that were written one behind another
+  bool has_attributes = false;  ///< as many bytes as its last two say follow a record
+  bool adds_up = false;         ///< all bytes of the file belong to it
+  std::size_t end = 0;
+  std::string warning{};  ///< where the header says something else
+};
+
+/// The ways to read a binary STL, the likeliest first; more than one where its size is not that of
+/// the triangles that its header announces. Refuses what header and size show to be wrong before
+/// the file is read.
+class RecordLayouts {
  public:
-  explicit Welder(const MeshFile& file) : file_(file), slots_(1024) {}
-
-  void reserve(std::size_t triangles) { mesh_.triangles.reserve(triangles); }
-
-  void addTriangle(const std::array<Vec3d, 3>& corners) {
-    for (const Vec3d& corner : corners) {
-      batch_[batched_] = corner + Vec3d(0.0);  // −0 becomes +0
-      hashes_[batched_] = hashOf(batch_[batched_]);
-      ++batched_;
+  explicit RecordLayouts(const MeshFile& file) : file_(file), size_(file.size()) {
+    if (size_ < header_size) {
+      file.refuse("cut off: a binary STL has at least 84 bytes, this one has " +
+                  std::to_string(size_) + "; export it again");
     }
-    if (batched_ == batch_.size()) weldBatch();
+    announced_ = littleEndian32(file.head().data() + header_size - 4);
+    held_ = (size_ - header_size) / facet_size;
+    fills_file_ = (size_ - header_size) % facet_size == 0;
+    // Writers that cannot go back to fill in the count leave one of these.
+    has_count_ = announced_ != 0 && announced_ != 0xFFFFFFFF;
+    if (announced_ > held_ && (has_count_ || !fills_file_)) {
+      file.refuseAtByte(file.head().data() + size_,
+                        "cut off: " + counts() + "; export or download it again");
+    }
+    if (size_ > file.head().size() && isBlank(file.head().substr(header_size))) {
+      file.refuse("holds no triangles but zeros, as far as " + std::to_string(file.head().size()) +
+                  " bytes tell; export or download it again");
+    }
   }
 
-  Mesh take() {
-    weldBatch();
-    return std::move(mesh_);
+  [[nodiscard]] std::vector<RecordLayout> all() {
+    if (announced_ == held_ && (fills_file_ || held_ == 0)) {
+      return {{.blocks = {{0, held_}}, .adds_up = true, .end = size_}};
+    }
+    std::vector<RecordLayout> layouts;
+    tryAttributes(layouts);
+    tryBlocks(layouts);
+    const std::size_t end = header_size + announced_ * facet_size;
+    // A little too much is a remark of the writer, or a count that is a little too low.
+    const bool is_near = size_ <= std::max(2 * end, file_.head().size());
+    if (fills_file_ && (is_near || !has_count_)) {
+      layouts.push_back({.blocks = {{0, held_}},
+                         .adds_up = !has_count_,
+                         .end = size_,
+                         .warning = counts() + ": read all of them"});
+    }
+    if (has_count_ && is_near) layouts.push_back({.blocks = {{0, announced_}}, .end = end});
+    if (layouts.empty()) {
+      file_.refuse("its header announces " + (has_count_ ? std::to_string(announced_) : "no") +
+                   " triangles, which are not what its " + std::to_string(size_) +
+                   " bytes hold; export or download it again");
+    }
+    return layouts;
   }
 
  private:
-  static constexpr auto none = std::numeric_limits<std::uint32_t>::max();
-  struct Slot {
-    std::uint32_t hash = 0;
-    std::uint32_t vertex = none;
-  };
-
-  static std::uint32_t hashOf(const Vec3d& position) {
-    std::uint64_t hash = std::bit_cast<std::uint64_t>(position.x()) * 0x9E3779B97F4A7C15 +
-                         std::bit_cast<std::uint64_t>(position.y()) * 0xC2B2AE3D27D4EB4F +
-                         std::bit_cast<std::uint64_t>(position.z()) * 0x165667B19E3779F9;
-    hash ^= hash >> 32;
-    hash *= 0xD6E8FEB86659FD93;
-    return static_cast<std::uint32_t>(hash >> 32);
+  [[nodiscard]] std::string counts() const {
+    return "the header announces " + std::to_string(announced_) + " triangles, the file holds " +
+           std::to_string(held_);
   }
 
-  void weldBatch() {
-    for (std::size_t i = 0; i < batched_; ++i) __builtin_prefetch(&slots_[home(hashes_[i])]);
-    for (std::size_t i = 0; i < batched_; ++i) {
-      const Slot& slot = slots_[home(hashes_[i])];
-      if (slot.vertex != none) __builtin_prefetch(&mesh_.vertices[slot.vertex]);
-    }
-    for (std::size_t i = 0; i < batched_; i += 3) {
-      const std::uint32_t a = vertexAt(i);
-      const std::uint32_t b = vertexAt(i + 1);
-      mesh_.triangles.push_back({a, b, vertexAt(i + 2)});
-    }
-    batched_ = 0;
+  [[nodiscard]] const char* at(std::size_t offset) const {
+    const bool is_in_head = offset + 4 <= file_.head().size();
+    return (is_in_head ? file_.head() : file_.bytes()).data() + offset;
   }
 
-  /// The vertex of corner `i` of the batch.
-  std::uint32_t vertexAt(std::size_t i) {
-    std::size_t at = home(hashes_[i]);
-    for (; slots_[at].vertex != none; at = next(at)) {
-      if (slots_[at].hash == hashes_[i] && mesh_.vertices[slots_[at].vertex] == batch_[i]) {
-        return slots_[at].vertex;
-      }
-    }
-    if (mesh_.vertices.size() == none) {
-      file_.refuse("more than 4294967295 vertices; split the part");
-    }
-    const auto vertex = static_cast<std::uint32_t>(mesh_.vertices.size());
-    slots_[at] = {hashes_[i], vertex};
-    mesh_.vertices.push_back(batch_[i]);
-    if (mesh_.vertices.size() * 2 > slots_.size()) grow();
-    return vertex;
+  void tryAttributes(std::vector<RecordLayout>& layouts) const {
+    constexpr std::size_t most_attributes = 0xFFFF;
+    if (!has_count_ || size_ > header_size + announced_ * (facet_size + most_attributes)) return;
+    std::size_t end = header_size;
+    std::size_t count = 0;
+    for (; count < announced_ && end + facet_size <= size_; ++count)
+      end += facet_size + littleEndian16(at(end + facet_size - 2));
+    if (end != size_ || count != announced_) return;
+    layouts.push_back(
+        {.blocks = {{0, count}}, .has_attributes = true, .adds_up = true, .end = size_});
   }
 
-  void grow() {
-    std::vector<Slot> before(slots_.size() * 2);
-    slots_.swap(before);
-    for (const Slot& slot : before) {
-      if (slot.vertex == none) continue;
-      std::size_t at = home(slot.hash);
-      while (slots_[at].vertex != none) at = next(at);
-      slots_[at] = slot;
+  void tryBlocks(std::vector<RecordLayout>& layouts) const {
+    RecordLayout layout{.blocks = {}, .adds_up = true, .end = 0};
+    while (layout.end + header_size <= size_) {
+      const std::size_t count = littleEndian32(at(layout.end + header_size - 4));
+      layout.blocks.push_back({layout.end, count});
+      layout.end += header_size + count * facet_size;
+      if (count == 0) return;
     }
+    if (layout.end != size_) return;
+    layout.warning = "read all of " + std::to_string(layout.blocks.size()) +
+                     " binary STL files, one behind another";
+    layouts.push_back(std::move(layout));
   }
-
-  /// Where the search for a hash starts, and how it goes on.
-  [[nodiscard]] std::size_t home(std::uint32_t hash) const { return hash & (slots_.size() - 1); }
-  [[nodiscard]] std::size_t next(std::size_t at) const { return (at + 1) & (slots_.size() - 1); }
 
   const MeshFile& file_;
-  std::vector<Slot> slots_;
-  std::array<Vec3d, 96> batch_;
-  std::array<std::uint32_t, 96> hashes_;
-  std::size_t batched_ = 0;
-  Mesh mesh_;
+  std::size_t size_;
+  std::size_t announced_ = 0;
+  std::size_t held_ = 0;
+  bool fills_file_ = false;
+  bool has_count_ = false;
 };
 
-/// How many triangles to read: what the size holds, as long as the header does not promise more.
-std::size_t countFacets(const MeshFile& file) {
-  const std::string_view bytes = file.bytes();
-  if (bytes.size() < header_size) {
-    file.refuse("cut off: a binary STL has at least 84 bytes, this one has " +
-                std::to_string(bytes.size()) + "; export it again");
+Mesh readRecords(const MeshFile& file, const RecordLayout& layout) {
+  VertexWelder welder(file);
+  std::size_t triangles = 0;
+  for (const RecordLayout::Block& block : layout.blocks) {
+    welder.reserve(block.count);
+    const char* facet = file.bytes().data() + block.header + header_size;
+    for (std::size_t i = 0; i < block.count; ++i) {
+      if (triangles++ % triangles_per_look == 0) throwIfInterrupted();
+      std::array<Vec3d, 3> corners;
+      const char* at = facet + normal_size;
+      for (Vec3d& corner : corners) {
+        corner = {littleEndianFloat(at), littleEndianFloat(at + 4), littleEndianFloat(at + 8)};
+        if (!isFinite(corner)) {
+          file.refuseAtByte(at, "triangle " + std::to_string(triangles) +
+                                    " has a corner that is not finite (" + shown(corner) +
+                                    "); repair the mesh");
+        }
+        at += 12;
+      }
+      welder.addTriangle(corners);
+      facet += facet_size + (layout.has_attributes ? littleEndian16(at) : 0);
+    }
   }
-  const std::size_t announced = littleEndian32(bytes.data() + header_size - 4);
-  const std::size_t held = (bytes.size() - header_size) / facet_size;
-  const std::size_t rest = (bytes.size() - header_size) % facet_size;
-  // Writers that cannot go back to fill in the count leave one of these.
-  const bool placeholder = announced == 0 || announced == 0xFFFFFFFF;
-  if (announced > held && !(placeholder && rest == 0)) {
-    file.refuseAtByte(bytes.data() + bytes.size(),
-                      "cut off: the header announces " + std::to_string(announced) +
-                          " triangles, the file holds " + std::to_string(held) +
-                          "; export or download it again");
+  return welder.take();
+}
+
+/// Reads the layout that makes a closed mesh, or else the first into which all bytes fit.
+Mesh readBinaryStl(const MeshFile& file) {
+  const std::vector<RecordLayout> layouts = RecordLayouts(file).all();
+  if (layouts.size() == 1 && layouts.front().adds_up) {
+    if (!layouts.front().warning.empty()) file.warn(layouts.front().warning);
+    return readRecords(file, layouts.front());
   }
-  if (rest == 0 && announced != held) {
-    file.warn("the header announces " + std::to_string(announced) + " triangles, the file holds " +
-              std::to_string(held) + ": read all of them");
-    return held;
+  const RecordLayout* best = nullptr;
+  std::optional<Mesh> mesh;
+  for (const RecordLayout& layout : layouts) {
+    const bool is_last = &layout == &layouts.back();
+    try {
+      Mesh made = readRecords(file, layout);
+      const bool closed = isClosed(made);
+      if (!closed && best != nullptr) continue;
+      if (!closed && !layout.adds_up && !is_last) continue;
+      best = &layout;
+      mesh = std::move(made);
+      if (closed) break;
+    } catch (const DataError&) {
+      if (is_last && best == nullptr) throw;
+    }
   }
-  if (rest != 0) {
-    file.warn("ignored " + std::to_string(bytes.size() - header_size - announced * facet_size) +
-              " bytes after the last triangle");
-  }
-  return announced;
+  judgeUnread(file, *mesh, file.bytes().substr(best->end), "the last triangle");
+  if (!best->warning.empty()) file.warn(best->warning);
+  return std::move(*mesh);
 }
 
 /// Whether the size is exactly that of a binary STL with as many triangles as its header announces.
-bool hasSizeOfBinaryStl(std::string_view bytes) {
-  return bytes.size() >= header_size &&
-         bytes.size() - header_size == littleEndian32(bytes.data() + header_size - 4) * facet_size;
+bool hasSizeOfBinaryStl(const MeshFile& file) {
+  return file.size() >= header_size &&
+         file.size() - header_size ==
+             littleEndian32(file.head().data() + header_size - 4) * facet_size;
 }
 
-Mesh readBinaryStl(const MeshFile& file) {
-  const std::size_t count = countFacets(file);
-  Welder welder(file);
-  welder.reserve(count);
-  const char* facet = file.bytes().data() + header_size;
-  for (std::size_t triangle = 0; triangle < count; ++triangle, facet += facet_size) {
-    std::array<Vec3d, 3> corners;
-    const char* at = facet + normal_size;
-    for (Vec3d& corner : corners) {
-      corner = {littleEndianFloat(at), littleEndianFloat(at + 4), littleEndianFloat(at + 8)};
-      if (!isFinite(corner)) {
-        file.refuseAtByte(at, "triangle " + std::to_string(triangle + 1) +
-                                  " has a corner that is not finite (" + shown(corner) +
-                                  "); repair the mesh");
-      }
-      at += 12;
-    }
-    welder.addTriangle(corners);
-  }
-  return welder.take();
+/// Whether `word` begins with `lower`, case aside.
+bool beginsWith(std::string_view word, std::string_view lower) {
+  return equalsIgnoringCase(word.substr(0, lower.size()), lower);
 }
 
-Mesh readAsciiStl(const MeshFile& file) {
-  Welder welder(file);
-  TextCursor text(file.text());
-  std::array<Vec3d, 3> corners;
-  std::size_t corner_count = 0;
-  bool in_loop = false;
-  bool in_solid = false;
-  for (; !text.atEnd(); text.skipLine()) {
-    const char* line = text.position();
-    const std::string_view keyword = text.word();
-    if (keyword.empty()) continue;
-    if (equalsIgnoringCase(keyword, "vertex")) {
-      const auto x = text.number();
-      const auto y = x ? text.number() : x;
-      const auto z = y ? text.number() : y;
-      if (!z || !text.word().empty()) {
-        file.refuseAtLine(line, "a vertex is not three numbers; repair the line or export again");
-      }
-      const Vec3d corner(*x, *y, *z);
-      if (!isFinite(corner)) {
-        file.refuseAtLine(line, "vertex is not finite (" + shown(corner) + "); repair the mesh");
-      }
-      if (!in_loop) file.refuseAtLine(line, "vertex outside of a loop; export it again");
-      if (corner_count < 3) corners[corner_count] = corner;
-      ++corner_count;
-    } else if (equalsIgnoringCase(keyword, "facet") || equalsIgnoringCase(keyword, "endfacet")) {
-      if (in_loop) file.refuseAtLine(line, "the loop before is not closed; export it again");
-    } else if (equalsIgnoringCase(keyword, "outer")) {
-      if (in_loop) file.refuseAtLine(line, "the loop before is not closed; export it again");
-      in_loop = true;
-      corner_count = 0;
-    } else if (equalsIgnoringCase(keyword, "endloop")) {
-      if (!in_loop || corner_count != 3) {
-        file.refuseAtLine(line, "a facet has " + std::to_string(corner_count) +
-                                    " corners instead of 3; export triangles only");
-      }
-      welder.addTriangle(corners);
-      in_loop = false;
-    } else if (equalsIgnoringCase(keyword, "solid")) {
-      in_solid = true;
-    } else if (equalsIgnoringCase(keyword, "endsolid")) {
-      in_solid = false;
-    } else {
-      file.refuseAtLine(
-          line, inQuotes(keyword) + " is no keyword of STL; repair the line or export again");
+/// Whether `word` begins a remark that lasts to the end of its line.
+bool beginsRemark(std::string_view word) {
+  return word.starts_with('#') || word.starts_with("//") || word.starts_with(';') ||
+         beginsWith(word, "color") || beginsWith(word, "colour") ||
+         equalsIgnoringCase(word, "comment");
+}
+
+/// Reads the text form by words, as lines have no meaning but to end names and remarks.
+class AsciiStlReader {
+ public:
+  explicit AsciiStlReader(const MeshFile& file)
+      : file_(file), welder_(file), all_(file.text()), text_(all_), at_(text_.position()) {}
+
+  Mesh read() {
+    while (const auto word = next()) readStatement(*word);
+    if (in_loop_ || corner_count_ > 0) refuseCutOff();
+    if (in_solid_) {
+      file_.warnAtLine(text_.position(),
+                       "the file ends without 'endsolid': it may have been cut off");
+    }
+    return welder_.take();
+  }
+
+ private:
+  /// The next word, on whatever line. The statement that it begins is named in messages.
+  std::optional<std::string_view> next() {
+    text_.skipBlanks();
+    if (text_.atLineEnd()) {
+      follows_end_ = false;
+      text_.skipSpace();
+    }
+    at_ = text_.position();
+    if (text_.atEnd()) return std::nullopt;
+    return text_.word();
+  }
+
+  void readStatement(std::string_view word) {
+    if (equalsIgnoringCase(word, "vertex")) {
+      readVertex();
+    } else if (equalsIgnoringCase(word, "endloop")) {
+      endLoop();
+    } else if (equalsIgnoringCase(word, "endfacet")) {
+      endFacet();
+    } else if (equalsIgnoringCase(word, "facet")) {
+      beginFacet();
+    } else if (equalsIgnoringCase(word, "outer")) {
+      beginLoop();
+    } else if (equalsIgnoringCase(word, "end")) {
+      readEnd();
+    } else if (beginsWith(word, "endsolid")) {
+      endSolid();
+    } else if (beginsWith(word, "solid")) {
+      beginSolid();
+    } else if (beginsRemark(word)) {
+      text_.skipLine();
+      follows_end_ = false;
+    } else if (!follows_end_) {
+      refuse(inQuotes(word) + " is no keyword of STL; repair the line or export again");
     }
   }
-  if (in_solid || in_loop) {
-    file.refuseAtLine(text.position(),
-                      "cut off: the file ends without 'endsolid'; export or download it again");
+
+  void readVertex() {
+    std::array<std::optional<double>, 3> numbers;
+    for (std::optional<double>& number : numbers) {
+      text_.skipSpace();
+      if (text_.atEnd()) refuseCutOff();
+      number = text_.number();
+      if (!number) refuseNumbers();
+    }
+    TextCursor behind = text_;
+    const std::string_view more = behind.word();
+    if (!more.empty() && !isKeyword(more) && !beginsRemark(more)) refuseNumbers();
+    const Vec3d corner(*numbers[0], *numbers[1], *numbers[2]);
+    if (!isFinite(corner)) refuse("vertex is not finite (" + shown(corner) + "); repair the mesh");
+    if (!in_loop_ && !in_facet_) refuse("vertex outside of a loop; export it again");
+    if (corner_count_ < 3) corners_[corner_count_] = corner;
+    ++corner_count_;
   }
-  return welder.take();
-}
+
+  void beginFacet() {
+    if (in_loop_ || corner_count_ > 0) refuse("the loop before is not closed; export it again");
+    in_facet_ = true;
+    skipNormal();
+  }
+
+  /// Passes over "normal" and three numbers, which may be nan in any spelling.
+  void skipNormal() {
+    for (int words = 0; words < 4; ++words) {
+      TextCursor ahead = text_;
+      ahead.skipSpace();
+      const std::string_view word = ahead.word();
+      if (isKeyword(word) || beginsRemark(word)) return;
+      text_ = ahead;
+    }
+    follows_end_ = true;
+  }
+
+  void beginLoop() {
+    if (in_loop_ || corner_count_ > 0) refuse("the loop before is not closed; export it again");
+    in_loop_ = true;
+    TextCursor ahead = text_;
+    ahead.skipSpace();
+    if (equalsIgnoringCase(ahead.word(), "loop")) text_ = ahead;
+  }
+
+  void endLoop() {
+    if (!in_loop_ || corner_count_ != 3) refuseCorners();
+    addTriangle();
+  }
+
+  /// Some writers leave out loops, or their ends.
+  void endFacet() {
+    if (in_loop_ || corner_count_ > 0) {
+      if (corner_count_ != 3) refuseCorners();
+      addTriangle();
+    }
+    in_facet_ = false;
+    follows_end_ = true;
+  }
+
+  void addTriangle() {
+    if (++triangles_ % triangles_per_look == 0) throwIfInterrupted();
+    welder_.addTriangle(corners_);
+    corner_count_ = 0;
+    in_loop_ = false;
+    follows_end_ = true;
+  }
+
+  void readEnd() {
+    const std::string_view what = text_.word();
+    if (equalsIgnoringCase(what, "loop")) return endLoop();
+    if (equalsIgnoringCase(what, "facet")) return endFacet();
+    if (equalsIgnoringCase(what, "solid")) return endSolid();
+    refuse(inQuotes("end " + std::string(what)) +
+           " is no keyword of STL; repair the line or export again");
+  }
+
+  void beginSolid() {
+    if (in_loop_ || corner_count_ > 0) refuse("the loop before is not closed; export it again");
+    in_solid_ = true;
+    skipName();
+  }
+
+  void endSolid() {
+    if (in_loop_ || corner_count_ > 0) refuse("the loop before is not closed; export it again");
+    in_solid_ = false;
+    in_facet_ = false;
+    skipName();
+  }
+
+  /// A name, of any words, ends with its line or before a facet.
+  void skipName() {
+    TextCursor rest = text_;
+    const std::string_view line = rest.line();
+    TextCursor name(line);
+    for (;;) {
+      name.skipBlanks();
+      const char* begin = name.position();
+      const std::string_view word = name.word();
+      if (word.empty()) break;
+      TextCursor facet = name;
+      if (equalsIgnoringCase(word, "facet") && equalsIgnoringCase(facet.word(), "normal") &&
+          facet.number()) {
+        text_ = TextCursor(all_.substr(static_cast<std::size_t>(begin - all_.data())));
+        return;
+      }
+    }
+    text_ = rest;
+  }
+
+  static bool isKeyword(std::string_view word) {
+    constexpr std::array<std::string_view, 6> keywords{"vertex", "endloop", "outer",
+                                                       "facet",  "endfacet", "end"};
+    return beginsWith(word, "endsolid") ||
+           std::any_of(keywords.begin(), keywords.end(), [&](std::string_view keyword) {
+             return equalsIgnoringCase(word, keyword);
+           });
+  }
+
+  [[noreturn]] void refuseNumbers() const {
+    refuse("a vertex is not three numbers; repair the line or export again");
+  }
+  [[noreturn]] void refuseCorners() const {
+    refuse("a facet has " + std::to_string(corner_count_) +
+           " corners instead of 3; export triangles only");
+  }
+  [[noreturn]] void refuseCutOff() const {
+    file_.refuseAtLine(text_.position(),
+                       "cut off: the file ends within a facet; export or download it again");
+  }
+  [[noreturn]] void refuse(const std::string& why) const { file_.refuseAtLine(at_, why); }
+
+  const MeshFile& file_;
+  VertexWelder welder_;
+  std::string_view all_;
+  TextCursor text_;
+  const char* at_;  ///< where the statement begins
+  std::array<Vec3d, 3> corners_;
+  std::size_t corner_count_ = 0;  ///< of the facet that is not yet a triangle
+  std::size_t triangles_ = 0;
+  bool in_solid_ = false;
+  bool in_facet_ = false;
+  bool in_loop_ = false;
+  bool follows_end_ = false;  ///< what is left of the line is a remark
+};
 
 bool startsLikeAscii(const MeshFile& file) {
-  return equalsIgnoringCase(file.start().substr(0, 5), "solid");
+  TextCursor text(file.start(), TextCursor::Comments::hash);
+  text.skipSpace();
+  const std::string_view word = text.word();
+  return beginsWith(word, "solid") || equalsIgnoringCase(word, "facet");
 }
 
 MeshMatch matchStl(const MeshFile& file) {
-  if (hasSizeOfBinaryStl(file.bytes())) return MeshMatch::proof;
+  if (hasSizeOfBinaryStl(file)) return MeshMatch::proof;
   if (startsLikeAscii(file)) return MeshMatch::likely;
   return !file.isText() && file.isNamed(".stl") ? MeshMatch::name : MeshMatch::none;
 }
 
 Mesh readStl(const MeshFile& file) {
-  const bool is_ascii = !hasSizeOfBinaryStl(file.bytes()) && startsLikeAscii(file) && file.isText();
-  return is_ascii ? readAsciiStl(file) : readBinaryStl(file);
+  const bool is_ascii = !hasSizeOfBinaryStl(file) && startsLikeAscii(file) && file.isText();
+  return is_ascii ? AsciiStlReader(file).read() : readBinaryStl(file);
 }
 
 /// Header of 80 bytes, count, and 50 bytes a triangle.

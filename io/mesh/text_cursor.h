@@ -9,13 +9,21 @@
 #include <string_view>
 #include <system_error>
 
+#include "vdbdither/model/words.h"
+
 namespace vdbdither {
 
 /// Walks through a text by lines, words and numbers. "\n", "\r" and "\r\n" end a line; a backslash
-/// before the end of a line continues it.
+/// at the end of a line, also before blanks, continues it.
 class TextCursor {
  public:
-  explicit TextCursor(std::string_view text) : at_(text.data()), end_(text.data() + text.size()) {}
+  /// Whether '#' begins a comment, also within a word. A comment ends with its line.
+  enum class Comments { none, hash };
+
+  explicit TextCursor(std::string_view text, Comments comments = Comments::none)
+      : at_(text.data()),
+        end_(text.data() + text.size()),
+        has_comments_(comments == Comments::hash) {}
 
   [[nodiscard]] const char* position() const { return at_; }
   [[nodiscard]] bool atEnd() const { return at_ == end_; }
@@ -26,8 +34,10 @@ class TextCursor {
       if (at_ != end_ && isBlank(*at_)) {
         ++at_;
       } else if (continuesLine(at_)) {
-        ++at_;
+        for (++at_; isBlank(*at_);) ++at_;
         skipLineEnd();
+      } else if (beginsComment(at_)) {
+        line();
       } else {
         return;
       }
@@ -80,14 +90,19 @@ class TextCursor {
     return at == end_ || *at == '\n' || *at == '\r';
   }
   [[nodiscard]] bool continuesLine(const char* at) const {
-    return at != end_ && *at == '\\' && at + 1 != end_ && endsLine(at + 1);
+    if (at == end_ || *at != '\\') return false;
+    for (++at; at != end_ && isBlank(*at);) ++at;
+    return at != end_ && endsLine(at);
+  }
+  [[nodiscard]] bool beginsComment(const char* at) const {
+    return has_comments_ && at != end_ && *at == '#';
   }
   [[nodiscard]] bool endsWord(const char* at) const {
-    return endsLine(at) || isBlank(*at) || continuesLine(at);
+    return endsLine(at) || isBlank(*at) || continuesLine(at) || beginsComment(at);
   }
   static bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
-  /// Most characters are told to be part of a word, and of a line, by one comparison.
-  static bool isPlain(char c) { return static_cast<signed char>(c) > ' ' && c != '\\'; }
+  /// One comparison classifies most characters as part of a word.
+  static bool isPlain(char c) { return static_cast<signed char>(c) > '#' && c != '\\'; }
   void skipLineEnd() {
     if (at_ != end_ && *at_ == '\r') {
       ++at_;
@@ -149,16 +164,7 @@ class TextCursor {
 
   const char* at_;
   const char* end_;
+  bool has_comments_;
 };
-
-/// Whether two ASCII words are equal but for upper and lower case; `lower` is lower case.
-inline bool equalsIgnoringCase(std::string_view word, std::string_view lower) {
-  if (word.size() != lower.size()) return false;
-  for (std::size_t i = 0; i < word.size(); ++i) {
-    const char c = word[i];
-    if ((c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c) != lower[i]) return false;
-  }
-  return true;
-}
 
 }  // namespace vdbdither

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
 
 #include "io/file/data_files.h"
+#include "io/file/file_name.h"
+#include "io/file/whole_file.h"
 #include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/options.h"
 #include "vdbdither/model/errors.h"
@@ -32,6 +33,8 @@ class ProfileParser {
           "");
     profile_.name = this->text(json, "name", "");
     if (!json.contains("name")) problems_.emplace_back("there is no name");
+    if (const auto problem = fileNameProblem(profile_.name); problem && !profile_.name.empty())
+      problems_.push_back("its name " + *problem);
     profile_.title = json.contains("title") ? this->text(json, "title", "") : profile_.name;
     profile_.source = json.contains("source") ? this->text(json, "source", "") : "";
     profile_.pitch_mm = lengths(json, "pitch_mm", 1e-4, 100);
@@ -101,6 +104,8 @@ class ProfileParser {
     known(entry, {"name", "rgba"}, where);
     material.name = text(entry, "name", where);
     if (material.name.empty()) problems_.push_back(where + "there is no name");
+    if (const auto problem = fileNameProblem(material.name); problem && !material.name.empty())
+      problems_.push_back(where + "its name " + *problem);
     const ordered_json rgba = entry.value("rgba", ordered_json());
     bool proper = rgba.is_array() && rgba.size() == 4;
     for (std::size_t channel = 0; proper && channel < 4; ++channel) {
@@ -136,11 +141,13 @@ std::pair<std::filesystem::path, std::string> readProfile(const std::string& nam
     }
     path = *findDataFile("printers/" + name_or_path + ".json");
   }
-  std::ifstream file(path);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf()))
-    throw UsageError("no such printer profile '" + path.string() + "'");
-  return {path, text.str()};
+  std::error_code none;
+  const std::string shown = "'" + path.string() + "'";
+  if (!std::filesystem::is_regular_file(path, none))
+    throw UsageError("no such printer profile " + shown);
+  constexpr std::uint64_t most_bytes = 1 << 20;
+  const std::vector<std::uint8_t> bytes = readWholeFile(path, shown, most_bytes);
+  return {path, {bytes.begin(), bytes.end()}};
 }
 
 }  // namespace

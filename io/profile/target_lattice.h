@@ -7,7 +7,7 @@
 
 namespace vdbdither {
 
-/// The pitch in mm that --printer or --pitch asks a source for. A printer's profile goes into the
+/// Returns the pitch in mm that --printer or --pitch sets. The profile of a printer is added to the
 /// metadata of `schema`.
 ///
 /// Throws UsageError unless exactly one of the two is given, and what readPrinterProfile throws.

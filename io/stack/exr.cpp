@@ -97,8 +97,8 @@ class ExrSlices : public SliceEncoder {
   std::vector<ExrChannel> channels_;
 };
 
-SpanImage decodeMaterials(std::span<const std::uint8_t> bytes) {
-  return decodeExr(bytes, "material");
+SpanImage decodeMaterials(std::span<const std::uint8_t> bytes, const SizeCheck& check) {
+  return decodeExr(bytes, "material", check);
 }
 
 }  // namespace
@@ -106,6 +106,7 @@ SpanImage decodeMaterials(std::span<const std::uint8_t> bytes) {
 extern const SliceFormat exr;
 const SliceFormat exr{.name = "exr",
                       .summary = "Material index, and distance and normal where there are any",
+                      .ending = ".exr",
                       .pixel = SlicePixel::index,
                       .encoder = makeSliceEncoder<ExrSlices>,
                       .decode = decodeMaterials,

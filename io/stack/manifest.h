@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -41,16 +43,36 @@ struct Manifest {
   [[nodiscard]] ZRange knownLayers() const {
     return {layers.begin - cropped_below, layers.end + cropped_above};
   }
+
+  /// The maximum size of the file of a slice, in bytes: that of its pixels with all channels that a
+  /// format has, uncompressed.
+  [[nodiscard]] std::uint64_t mostBytesOfSlice() const {
+    constexpr std::uint64_t header = 1 << 20;
+    constexpr std::uint64_t pixel = 32;
+    return header + pixel * layout.width() * layout.height();
+  }
 };
 
 /// The end of a refusal that names the remedy.
 inline constexpr const char* make_stack_again = "; make the stack again with slice-export";
 
-/// Returns the text of `manifest.json`.
+/// The end of a refusal that a user who edited a stack can get past.
+inline constexpr const char* make_stack_again_or_take_edited =
+    "; make the stack again with slice-export, or give --edited to take it as it is";
+
+/// Whether a stack is taken that differs from what slice-export wrote.
+enum class EditedStack { refused, taken };
+
+/// Returns the text of `manifest.json`, which ends with a digest of the rest.
 std::string textOf(const Manifest& manifest);
 
-/// Reads the manifest of a stack. Throws DataError where it is missing or malformed, and where its
-/// lattice, layout and layers do not fit together.
-Manifest readManifest(const StackInput& stack);
+/// Reads the manifest of a stack. Throws DataError where it is missing or malformed, where its
+/// lattice, layout and layers do not fit together, and where it is not as `textOf` made it.
+/// @param edited  taken: warns of the last
+Manifest readManifest(const StackInput& stack, EditedStack edited,
+                      const std::function<void(const std::string&)>& warn);
+
+/// Returns the files that the manifest of a stack names, whatever else it says. Throws DataError.
+std::set<std::string> filesNamedBy(const StackInput& stack);
 
 }  // namespace vdbdither

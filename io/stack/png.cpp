@@ -20,6 +20,7 @@ class PngSlices : public SliceEncoder {
 extern const SliceFormat png;
 const SliceFormat png{.name = "png",
                       .summary = "32-bit RGBA in the colours of the materials",
+                      .ending = ".png",
                       .pixel = SlicePixel::colour,
                       .encoder = makeSliceEncoder<PngSlices>,
                       .decode = decodePng,

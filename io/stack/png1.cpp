@@ -22,6 +22,7 @@ class BitPngSlices : public SliceEncoder {
 extern const SliceFormat png1;
 const SliceFormat png1{.name = "png1",
                        .summary = "For each material a folder of slices with 1 bit per voxel",
+                       .ending = ".png",
                        .pixel = SlicePixel::one_material,
                        .encoder = makeSliceEncoder<BitPngSlices>,
                        .decode = decodePng,

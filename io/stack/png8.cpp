@@ -21,6 +21,7 @@ class GreyPngSlices : public SliceEncoder {
 extern const SliceFormat png8;
 const SliceFormat png8{.name = "png8",
                        .summary = "Grey: 255 where printed, else 0",
+                       .ending = ".png",
                        .pixel = SlicePixel::printed,
                        .encoder = makeSliceEncoder<GreyPngSlices>,
                        .decode = decodePng,

@@ -1,5 +1,7 @@
 #include "io/stack/slice_format.h"
 
+#include <algorithm>
+
 #include "io/image/png_spans.h"
 #include "vdbdither/model/words.h"
 
@@ -9,7 +11,7 @@ void SliceEncoder::plan(const Manifest& stack, const Grids& /*grids*/) { stack_ 
 
 void SliceEncoder::finish(const Manifest& stack, const SpanImage& preview,
                           StackOutput& output) const {
-  output.write("preview.png", encodePng(preview, {}));
+  output.write(preview_name, encodePng(preview, {}));
   const std::string text = textOf(stack);
   output.write(manifest_name, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
@@ -36,6 +38,14 @@ const SliceFormat* findSliceFormat(std::string_view name) {
     if (format->name == name) return format;
   }
   return nullptr;
+}
+
+bool namesSlice(const std::filesystem::path& path) {
+  const std::string ending = path.extension().string();
+  return std::any_of(sliceFormats().begin(), sliceFormats().end(), [&](const SliceFormat* format) {
+    return equalsIgnoringCase(ending, format->ending) ||
+           (!ending.empty() && equalsIgnoringCase(ending, format->other_ending));
+  });
 }
 
 std::string sliceFormatNames(const std::function<bool(const SliceFormat&)>& choose) {

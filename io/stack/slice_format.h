@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -10,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "io/image/size_check.h"
 #include "io/stack/manifest.h"
 #include "io/stack/stack_files.h"
 #include "vdbdither/engine/options.h"
@@ -91,13 +93,17 @@ class SliceEncoder {
 struct SliceFormat {
   std::string_view name;     ///< as --format takes it
   std::string_view summary;  ///< what a slice holds, for --help
+  std::string_view ending;   ///< of its files' names: lower case, with a dot
   SlicePixel pixel;
 
   std::unique_ptr<SliceEncoder> (*encoder)();
-  /// Returns the pixels of a file: colours as rgba() makes them, or numbers. Throws DataError in
-  /// words that go on from the file's name.
-  SpanImage (*decode)(std::span<const std::uint8_t> bytes);
+  /// Returns the pixels of a file: colours as rgba() makes them, or numbers. Calls `check` with the
+  /// width and height before it makes a pixel. Throws DataError in words that go on from the file's
+  /// name.
+  SpanImage (*decode)(std::span<const std::uint8_t> bytes, const SizeCheck& check);
   bool decodes_colours = false;  ///< whether `decode` returns colours
+
+  std::string_view other_ending = {};  ///< one that other programs give such files
 
   /// What a file takes for each leaf at the surface, about, in bytes.
   double bytes_per_leaf = 0;
@@ -128,6 +134,9 @@ std::span<const SliceFormat* const> sliceFormats();
 
 /// Returns the format called `name`, or null.
 const SliceFormat* findSliceFormat(std::string_view name);
+
+/// Whether `path` ends like a slice of some format, case aside.
+bool namesSlice(const std::filesystem::path& path);
 
 /// Returns "png1, tiff or exr": the names of all formats, or of those that `choose` takes.
 std::string sliceFormatNames(const std::function<bool(const SliceFormat&)>& choose = {});

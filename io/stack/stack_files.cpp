@@ -1,10 +1,12 @@
 #include "io/stack/stack_files.h"
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
+#include <algorithm>
 
+#include "io/file/file_name.h"
+#include "io/file/whole_file.h"
+#include "io/stack/manifest.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -13,27 +15,56 @@ namespace fs = std::filesystem;
 namespace {
 
 StagedOutput::Kind kindOf(const fs::path& target) {
-  return target.extension() == ".zip" ? StagedOutput::Kind::file : StagedOutput::Kind::folder;
+  return namesArchive(target) ? StagedOutput::Kind::file : StagedOutput::Kind::folder;
 }
 
-}  // namespace
-
-void StackOutput::check(const fs::path& target, bool overwrite) {
-  StagedOutput::check(target, kindOf(target), overwrite);
-  if (kindOf(target) == StagedOutput::Kind::folder && fs::exists(target) && !fs::is_empty(target) &&
-      !fs::exists(target / manifest_name)) {
-    throw UsageError("'" + target.string() + "' holds no " + manifest_name +
+/// What slice-export wrote into `folder`, by its manifest.
+std::set<std::string> filesOfStack(const fs::path& folder) {
+  std::error_code none;
+  if (!fs::exists(folder / manifest_name, none)) {
+    throw UsageError("'" + folder.string() + "' holds no " + manifest_name +
                      ", so it is no stack of slices to overwrite; name another folder");
+  }
+  try {
+    std::set<std::string> names = filesNamedBy(StackInput(folder));
+    names.insert({manifest_name, preview_name});
+    return names;
+  } catch (const DataError& error) {
+    throw UsageError(std::string(error.what()) +
+                     "; which files are the stack's is unknown, so delete the folder or name "
+                     "another one");
   }
 }
 
-StackOutput::StackOutput(const fs::path& target) : staged_(target, kindOf(target)) {
+/// The same path without what follows the name of a folder.
+fs::path unslashed(const fs::path& path) { return path.has_filename() ? path : path.parent_path(); }
+
+}  // namespace
+
+bool namesArchive(const fs::path& path) {
+  return equalsIgnoringCase(unslashed(path).extension().string(), archive_ending);
+}
+
+void StackOutput::check(const fs::path& target, bool overwrite,
+                        const std::function<void(const std::string&)>& warn) {
+  if (kindOf(target) == StagedOutput::Kind::file) {
+    StagedOutput::check(target, StagedOutput::Kind::file, overwrite);
+  } else {
+    StagedOutput::checkFolder(target, overwrite, filesOfStack, warn);
+  }
+}
+
+StackOutput::StackOutput(const fs::path& target)
+    : shown_(target), staged_(target, kindOf(target), filesOfStack) {
   if (kindOf(target) == StagedOutput::Kind::file)
     zip_ = std::make_unique<ZipWriter>(staged_.path(), target);
 }
 
 void StackOutput::write(const std::string& name, std::span<const std::uint8_t> bytes) {
   if (zip_) {
+    if (const auto problem = relativePathProblem(name))
+      throw DataError("cannot write '" + shown_.string() + "': the name '" + name + "' " +
+                      *problem);
     zip_->add(name, bytes);
   } else {
     staged_.write(name, bytes);
@@ -45,45 +76,91 @@ void StackOutput::commit() {
   staged_.commit();
 }
 
-StackInput::StackInput(const fs::path& path) : place_(path) {
+StackInput::StackInput(const fs::path& path) : place_(path), manifest_name_(manifest_name) {
   std::error_code none;
-  if (fs::is_directory(path, none)) {
-    if (!fs::exists(path / manifest_name, none)) {
-      throw DataError("'" + path.string() + "' holds no " + manifest_name +
-                      ", so it is no stack made by slice-export");
-    }
-  } else if (!fs::exists(path, none)) {
-    throw DataError("no such file or folder '" + path.string() + "'");
-  } else if (path.extension() == ".json") {
+  const fs::file_status status = fs::status(path, none);
+  if (!fs::exists(status)) throw DataError("no such file or folder '" + path.string() + "'");
+  if (!fs::is_directory(status) && equalsIgnoringCase(path.extension().string(), ".json")) {
     place_ = path.parent_path();
-  } else {
+    manifest_name_ = path.filename().string();
+  } else if (!fs::is_directory(status)) {
     zip_ = std::make_unique<ZipReader>(path);
-    if (!zip_->contains(manifest_name)) {
-      throw DataError("'" + path.string() + "' holds no " + manifest_name +
-                      ", so it is no stack made by slice-export");
-    }
   }
+  if (!contains(manifest_name_)) {
+    throw DataError("'" + path.string() + "' holds no " + manifest_name +
+                    ", so it is no stack made by slice-export");
+  }
+}
+
+StackInput StackInput::putBack(const fs::path& path,
+                               const std::function<void(const std::string&)>& warn) {
+  std::error_code none;
+  if (!path.empty() && fs::status(path, none).type() == fs::file_type::not_found)
+    StagedOutput::putBack(path, warn);
+  return StackInput(path);
 }
 
 std::string StackInput::shown(const std::string& name) const { return (place_ / name).string(); }
 
 bool StackInput::contains(const std::string& name) const {
   std::error_code none;
-  return zip_ ? zip_->contains(name) : fs::is_regular_file(place_ / name, none);
+  // What cannot be looked at is there until reading it tells why not.
+  return zip_ ? zip_->contains(name)
+              : fs::symlink_status(place_ / name, none).type() != fs::file_type::not_found;
 }
 
-std::vector<std::uint8_t> StackInput::read(const std::string& name) const {
-  if (zip_) return zip_->read(name);
-  errno = 0;
-  std::ifstream file(place_ / name, std::ios::binary | std::ios::ate);
-  std::vector<std::uint8_t> bytes;
-  if (file) {
-    bytes.resize(static_cast<std::size_t>(file.tellg()));
-    file.seekg(0);
-    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+std::vector<std::string> StackInput::names() const {
+  if (zip_) return zip_->names();
+  const fs::path folder = place_.empty() ? "." : place_;
+  std::vector<std::string> names;
+  std::error_code error;
+  constexpr auto skip = fs::directory_options::skip_permission_denied;
+  for (fs::recursive_directory_iterator entry(folder, skip, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->symlink_status().type() != fs::file_type::directory)
+      names.push_back(entry->path().lexically_relative(folder).string());
   }
-  if (!file) throw DataError("cannot read '" + shown(name) + "': " + std::strerror(errno));
-  return bytes;
+  if (error) throw DataError("cannot read '" + folder.string() + "': " + error.message());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+/// Names do not climb out of the stack, so only links lead out.
+void StackInput::refuseLinkOutside(const std::string& name) const {
+  std::error_code error;
+  for (fs::path part = name; !part.empty(); part = part.parent_path()) {
+    if (!fs::is_symlink(fs::symlink_status(place_ / part, error))) continue;
+    const fs::path stack = fs::canonical(place_.empty() ? "." : place_, error);
+    const fs::path file = error ? fs::path() : fs::canonical(place_ / name, error);
+    if (error) throw DataError("cannot read '" + shown(name) + "': " + error.message());
+    if (std::mismatch(stack.begin(), stack.end(), file.begin(), file.end()).first == stack.end())
+      return;
+    throw DataError("'" + shown(name) + "' is a link to '" + file.string() +
+                    "', which is outside the stack; copy the file into the stack");
+  }
+}
+
+void StackInput::check(const std::string& name, std::uint64_t most_bytes) const {
+  std::uint64_t bytes = 0;
+  const std::string file = "'" + shown(name) + "'";
+  if (zip_) {
+    bytes = zip_->size(name);
+  } else {
+    refuseLinkOutside(name);
+    std::error_code error;
+    if (!fs::is_regular_file(fs::status(place_ / name, error)))
+      throw DataError(file + " is not an ordinary file");
+    bytes = fs::file_size(place_ / name, error);
+    if (error) throw DataError("cannot read " + file + ": " + error.message());
+  }
+  if (bytes > most_bytes) throw DataError(tooLarge(file, bytes, most_bytes));
+}
+
+std::vector<std::uint8_t> StackInput::read(const std::string& name,
+                                           std::uint64_t most_bytes) const {
+  if (zip_) return zip_->read(name, most_bytes);
+  refuseLinkOutside(name);
+  return readWholeFile(place_ / name, "'" + shown(name) + "'", most_bytes);
 }
 
 }  // namespace vdbdither

@@ -1,12 +1,14 @@
 #include "io/stack/stack_reader.h"
 
 #include <algorithm>
+#include <set>
 #include <span>
 #include <utility>
 
 #include "io/file/digest.h"
 #include "io/image/png_spans.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -42,20 +44,26 @@ int overlay(SpanImage& image, const SpanImage& mask, std::uint32_t value) {
 
 }  // namespace
 
-StackReader::StackReader(const std::filesystem::path& path,
+StackReader::StackReader(const std::filesystem::path& path, EditedStack edited,
                          std::function<void(const std::string&)> warn)
-    : input_(path),
+    : input_(StackInput::putBack(path, warn)),
+      edited_(edited),
       warn_(std::move(warn)),
-      manifest_(readManifest(input_)),
+      manifest_(readManifest(input_, edited, warn_)),
       format_(findSliceFormat(manifest_.format)) {
   if (format_ == nullptr) {
-    throw DataError("'" + input_.shown(manifest_name) + "': there is no format '" +
-                    manifest_.format + "'" + make_stack_again);
+    throw DataError("'" + input_.shownManifest() + "': there is no format '" + manifest_.format +
+                    "'" + make_stack_again);
   }
-  for (const Manifest::Slice& slice : manifest_.slices)
-    slices_[{slice.layer, slice.material}] = &slice;
+  indexSlices();
   checkFiles();
+  checkForOthers();
   meanings_ = meaningsOfPixels();
+}
+
+void StackReader::tellChange(const std::string& change) const {
+  if (edited_ == EditedStack::refused) throw DataError(change + make_stack_again_or_take_edited);
+  warn_(change + "; it is taken as it is");
 }
 
 std::vector<std::string> StackReader::filesOfLayer() const {
@@ -70,13 +78,39 @@ const Manifest::Slice* StackReader::find(int z, const std::string& material) con
   return slice == slices_.end() ? nullptr : slice->second;
 }
 
-/// The manifest tells of every slice, and they are there.
+/// Finds the slice of each layer. A layer with two slices could be either of them.
+void StackReader::indexSlices() {
+  const std::vector<std::string> kinds = filesOfLayer();
+  const std::set<std::string> known(kinds.begin(), kinds.end());
+  const std::string shown = "'" + input_.shownManifest() + "'";
+  if (known.size() != kinds.size())
+    throw DataError(shown + " names two materials alike" + make_stack_again);
+  std::string change;
+  for (const Manifest::Slice& slice : manifest_.slices) {
+    const std::string layer = std::to_string(numberOf(slice.layer));
+    if (!manifest_.layers.contains(slice.layer) || !known.contains(slice.material)) {
+      change = shown + " names the slice '" + slice.file + "' of layer " + layer +
+               ", which the stack does not have";
+      continue;
+    }
+    const auto [place, is_new] = slices_.try_emplace({slice.layer, slice.material}, &slice);
+    if (is_new) continue;
+    if (place->second->file != slice.file) {
+      throw DataError(shown + " names two slices of layer " + layer + ", '" + place->second->file +
+                      "' and '" + slice.file + "'; remove one of them");
+    }
+    change = shown + " names the slice of layer " + layer + " twice";
+  }
+  if (!change.empty()) tellChange(change);
+}
+
+/// Checks that the manifest lists every slice, that each file exists, and that none is too large.
 void StackReader::checkFiles() const {
   for (int z = manifest_.layers.begin; z < manifest_.layers.end; ++z) {
     for (const std::string& material : filesOfLayer()) {
       const Manifest::Slice* slice = find(z, material);
       if (slice == nullptr) {
-        throw DataError("'" + input_.shown(manifest_name) + "' names no slice of layer " +
+        throw DataError("'" + input_.shownManifest() + "' names no slice of layer " +
                         std::to_string(numberOf(z)) +
                         (material.empty() ? "" : " for '" + material + "'") + make_stack_again);
       }
@@ -84,6 +118,27 @@ void StackReader::checkFiles() const {
         throw DataError("the slice '" + input_.shown(slice->file) + "' of layer " +
                         std::to_string(numberOf(z)) + " is missing" + make_stack_again);
       }
+      input_.check(slice->file, manifest_.mostBytesOfSlice());
+    }
+  }
+}
+
+/// Whoever adds a slice may believe that it is read.
+void StackReader::checkForOthers() const {
+  std::set<std::string> named{preview_name};
+  for (const Manifest::Slice& slice : manifest_.slices) named.insert(slice.file);
+  for (const std::string& name : input_.names()) {
+    const std::filesystem::path file = std::filesystem::path(name).filename();
+    // File managers keep hidden files beside others of the same name.
+    const bool is_slice = equalsIgnoringCase(file.extension().string(), format_->ending) &&
+                          !file.string().starts_with('.');
+    if (is_slice && !named.contains(name)) {
+      const std::string change =
+          "the slice '" + input_.shown(name) + "' is not one that the manifest names";
+      if (edited_ == EditedStack::refused)
+        throw DataError(change + make_stack_again_or_take_edited);
+      warn_(change + "; it is left out, and so are others like it");
+      return;
     }
   }
 }
@@ -140,24 +195,26 @@ SpanImage StackReader::layer(int z) const {
 }
 
 SpanImage StackReader::read(const Manifest::Slice& slice) const {
-  const std::vector<std::uint8_t> bytes = input_.read(slice.file);
-  if (sha256Of(bytes) != slice.sha256 && !warned_.exchange(true)) {
-    warn_("'" + input_.shown(slice.file) +
-          "' is not as its manifest describes it; it is taken as it is, and so are others like it");
+  const std::vector<std::uint8_t> bytes = input_.read(slice.file, manifest_.mostBytesOfSlice());
+  const SliceLayout& layout = manifest_.layout;
+  const auto check = [&](std::uint32_t width, std::uint32_t height) {
+    if (width == layout.width() && height == layout.height()) return;
+    throw DataError("has " + std::to_string(width) + " x " + std::to_string(height) +
+                    " pixels, not " + std::to_string(layout.width()) + " x " +
+                    std::to_string(layout.height()) + " as the stack" + make_stack_again);
+  };
+  const std::string name = "the slice '" + input_.shown(slice.file) + "' of layer " +
+                           std::to_string(numberOf(slice.layer));
+  if (sha256Of(bytes) != slice.sha256 &&
+      (edited_ == EditedStack::refused || !warned_.exchange(true))) {
+    tellChange(name + " was changed after slice-export wrote it: its digest differs");
   }
   try {
-    SpanImage image = format_->decode(bytes);
-    const SliceLayout& layout = manifest_.layout;
-    if (image.width != layout.width() || image.height != layout.height()) {
-      throw DataError("has " + std::to_string(image.width) + " x " + std::to_string(image.height) +
-                      " pixels, not " + std::to_string(layout.width()) + " x " +
-                      std::to_string(layout.height()) + " as the stack" + make_stack_again);
-    }
+    SpanImage image = format_->decode(bytes, check);
     translate(image);
     return image;
   } catch (const DataError& error) {
-    throw DataError("the slice '" + input_.shown(slice.file) + "' of layer " +
-                    std::to_string(numberOf(slice.layer)) + " " + error.what());
+    throw DataError(name + " " + error.what());
   }
 }
 

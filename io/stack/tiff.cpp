@@ -20,9 +20,11 @@ class TiffSlices : public SliceEncoder {
 extern const SliceFormat tiff;
 const SliceFormat tiff{.name = "tiff",
                        .summary = "A palette of the colours of the materials",
+                       .ending = ".tif",
                        .pixel = SlicePixel::palette,
                        .encoder = makeSliceEncoder<TiffSlices>,
                        .decode = decodeTiff,
+                       .other_ending = ".tiff",
                        .bytes_per_leaf = 250,
                        .most_materials = 255};
 

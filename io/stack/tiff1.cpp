@@ -25,9 +25,11 @@ class BitTiffSlices : public SliceEncoder {
 extern const SliceFormat tiff1;
 const SliceFormat tiff1{.name = "tiff1",
                         .summary = "For each material a folder of slices with 1 bit per voxel",
+                        .ending = ".tif",
                         .pixel = SlicePixel::one_material,
                         .encoder = makeSliceEncoder<BitTiffSlices>,
                         .decode = decodeTiff,
+                        .other_ending = ".tiff",
                         .bytes_per_leaf = 80};
 
 }  // namespace vdbdither

@@ -1,5 +1,6 @@
 #include "io/stack/zip.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -8,6 +9,8 @@
 #include <utility>
 #include <zlib.h>
 
+#include "io/file/file_name.h"
+#include "io/file/whole_file.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -15,6 +18,12 @@ namespace vdbdither {
 namespace {
 
 constexpr std::size_t largest_piece = std::size_t{1} << 30;
+
+/// Archives of more files are not read. The tallest stacks have half as many.
+constexpr std::uint64_t most_members = 1 << 18;
+
+/// A bit of the flags of a member.
+constexpr std::uint64_t is_encrypted = 1;
 
 }  // namespace
 
@@ -61,44 +70,102 @@ void ZipWriter::finish() {
 }
 
 ZipReader::ZipReader(const std::filesystem::path& path) : path_(path) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none))
+    throw DataError("'" + path.string() + "' is not an ordinary file");
   file_ = unzOpen64(path.c_str());
   if (!file_) throw DataError("'" + path.string() + "' is not a readable zip archive");
-  for (int state = unzGoToFirstFile(file_); state == UNZ_OK; state = unzGoToNextFile(file_)) {
-    std::array<char, 4096> name{};
-    unz64_file_pos place{};
-    if (unzGetCurrentFileInfo64(file_, nullptr, name.data(), name.size() - 1, nullptr, 0, nullptr,
-                                0) != UNZ_OK ||
-        unzGetFilePos64(file_, &place) != UNZ_OK) {
-      break;
-    }
-    places_[name.data()] = {place.pos_in_zip_directory, place.num_of_file};
+  try {
+    readDirectory();
+  } catch (...) {
+    unzClose(file_);
+    throw;
   }
 }
 
 ZipReader::~ZipReader() { unzClose(file_); }
 
-std::vector<std::uint8_t> ZipReader::read(const std::string& name) {
-  const auto found = places_.find(name);
-  if (found == places_.end())
+void ZipReader::readDirectory() {
+  const std::string archive = "'" + path_.string() + "'";
+  unz_global_info64 all{};
+  if (unzGetGlobalInfo64(file_, &all) != UNZ_OK)
+    throw DataError(archive + " is not a readable zip archive");
+  if (all.number_entry > most_members) {
+    throw DataError(archive + " has " + std::to_string(all.number_entry) + " members; at most " +
+                    std::to_string(most_members) + " are read");
+  }
+  // The number has 16 bits in an archive without a zip64 record, and is this one for all from
+  // there.
+  constexpr std::uint64_t uncounted = 0xffff;
+  for (std::uint64_t i = 0; i < all.number_entry || all.number_entry == uncounted; ++i) {
+    std::array<char, 4096> text{};
+    unz_file_info64 information{};
+    unz64_file_pos place{};
+    if ((i == 0 ? unzGoToFirstFile(file_) : unzGoToNextFile(file_)) != UNZ_OK ||
+        unzGetCurrentFileInfo64(file_, &information, text.data(), text.size() - 1, nullptr, 0,
+                                nullptr, 0) != UNZ_OK ||
+        unzGetFilePos64(file_, &place) != UNZ_OK) {
+      if (all.number_entry == uncounted && i >= uncounted) return;
+      throw DataError(archive + " is damaged: its directory ends after " + std::to_string(i) +
+                      " of " + std::to_string(all.number_entry) + " members");
+    }
+    std::string name(text.data(), std::min<std::size_t>(information.size_filename, text.size()));
+    const bool is_folder = name.size() > 1 && name.ends_with('/');
+    if (is_folder) name.pop_back();
+    const auto refuse = [&](const std::string& why) {
+      throw DataError(archive + ": its member '" + name + "' " + why +
+                      "; pack the folder of the stack again");
+    };
+    if (const auto problem = relativePathProblem(name))
+      refuse("has no proper name: it " + *problem);
+    if (is_folder) continue;
+    if ((information.flag & is_encrypted) != 0) refuse("is encrypted");
+    if (information.compression_method != 0 && information.compression_method != Z_DEFLATED)
+      refuse("is neither stored nor deflated");
+    if (members_.size() == most_members) refuse("is one too many");
+    const Member member{place.pos_in_zip_directory, place.num_of_file,
+                        information.uncompressed_size};
+    if (!members_.emplace(name, member).second) refuse("is there twice");
+  }
+}
+
+std::vector<std::string> ZipReader::names() const {
+  std::vector<std::string> names;
+  for (const auto& [name, member] : members_) names.push_back(name);
+  return names;
+}
+
+std::string ZipReader::shown(const std::string& name) const {
+  return "'" + path_.string() + "': its file '" + name + "'";
+}
+
+const ZipReader::Member& ZipReader::member(const std::string& name) const {
+  const auto found = members_.find(name);
+  if (found == members_.end())
     throw DataError("'" + path_.string() + "' holds no file '" + name + "'");
+  return found->second;
+}
+
+std::vector<std::uint8_t> ZipReader::read(const std::string& name, std::uint64_t most_bytes) {
+  const Member& found = member(name);
+  if (found.bytes > most_bytes) throw DataError(tooLarge(shown(name), found.bytes, most_bytes));
   const std::lock_guard lock(mutex_);
-  unz64_file_pos place{found->second.offset, found->second.number};
-  const auto failed = [&] {
-    return DataError("'" + path_.string() + "': its file '" + name + "' is damaged");
-  };
+  unz64_file_pos place{found.offset, found.number};
+  const auto failed = [&] { return DataError(shown(name) + " is damaged"); };
   if (unzGoToFilePos64(file_, &place) != UNZ_OK || unzOpenCurrentFile(file_) != UNZ_OK)
     throw failed();
   std::vector<std::uint8_t> bytes;
   // Room grows with what comes: a damaged length must not ask for all of memory.
-  constexpr std::size_t step = 1 << 20;
+  constexpr std::uint64_t step = 1 << 20;
   for (int count = 1; count > 0;) {
     const std::size_t begin = bytes.size();
-    bytes.resize(begin + step);
-    count = unzReadCurrentFile(file_, bytes.data() + begin, step);
+    const std::uint64_t wanted = std::min(step, found.bytes - begin);
+    bytes.resize(begin + wanted);
+    count = unzReadCurrentFile(file_, bytes.data() + begin, static_cast<unsigned>(wanted));
     bytes.resize(begin + static_cast<std::size_t>(std::max(count, 0)));
     if (count < 0) throw failed();
   }
-  if (unzCloseCurrentFile(file_) != UNZ_OK) throw failed();
+  if (unzCloseCurrentFile(file_) != UNZ_OK || bytes.size() != found.bytes) throw failed();
   return bytes;
 }
 

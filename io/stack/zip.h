@@ -22,7 +22,7 @@ class ZipWriter {
   /// `name` is in UTF-8, with `/` between folders.
   void add(const std::string& name, std::span<const std::uint8_t> bytes);
 
-  /// Writes the directory at the end, without which it is no archive.
+  /// Writes the directory at the end of the archive. An archive without it cannot be read.
   void finish();
 
  private:
@@ -35,27 +35,39 @@ class ZipWriter {
 /// Reads files of a zip archive by name. Safe to use from many threads.
 class ZipReader {
  public:
-  /// Throws DataError for what is no zip archive.
+  /// Throws DataError if the file is not a zip archive, or if members are encrypted, share a name
+  /// or could be unpacked outside of a folder.
   explicit ZipReader(const std::filesystem::path& path);
   ZipReader(const ZipReader&) = delete;
   ZipReader& operator=(const ZipReader&) = delete;
   ~ZipReader();
 
-  [[nodiscard]] bool contains(const std::string& name) const { return places_.contains(name); }
+  [[nodiscard]] bool contains(const std::string& name) const { return members_.contains(name); }
+  [[nodiscard]] std::vector<std::string> names() const;
 
-  /// The whole file. Throws DataError where it is missing or its checksum is wrong.
-  [[nodiscard]] std::vector<std::uint8_t> read(const std::string& name);
+  /// The size that the archive's directory states, in bytes. Throws DataError where there is no
+  /// such file.
+  [[nodiscard]] std::uint64_t size(const std::string& name) const { return member(name).bytes; }
+
+  /// The whole file. Throws DataError where it is missing, has more than `most_bytes`, or its
+  /// checksum is wrong. Never takes more memory than the stated size.
+  [[nodiscard]] std::vector<std::uint8_t> read(const std::string& name, std::uint64_t most_bytes);
 
  private:
   /// Where a file lies: in the archive's directory, and its number there.
-  struct Place {
+  struct Member {
     std::uint64_t offset = 0;
     std::uint64_t number = 0;
+    std::uint64_t bytes = 0;  ///< unpacked
   };
+
+  void readDirectory();
+  [[nodiscard]] const Member& member(const std::string& name) const;
+  [[nodiscard]] std::string shown(const std::string& name) const;
 
   std::filesystem::path path_;
   void* file_ = nullptr;
-  std::map<std::string, Place> places_;
+  std::map<std::string, Member> members_;
   std::mutex mutex_;
 };
 

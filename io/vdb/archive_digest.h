@@ -18,9 +18,9 @@ inline constexpr std::size_t uuid_size = 36;
 /// What OpenVDB needs to see of an archive before it is read: the part up to the end of its UUID.
 inline constexpr std::size_t archive_head_size = uuid_offset + uuid_size;
 
-/// The UUID of an archive of ours. It has version 8 (RFC 9562: vendor-specific), which tells it
-/// from OpenVDB's random ones: 48 bits are the archive's length in bytes, 72 bits the beginning of
-/// the SHA-256 of all its other bytes.
+/// The UUID of an archive that this program writes. Its version is 8 (RFC 9562: vendor-specific);
+/// the random ones of OpenVDB have another. 48 bits are the archive's length in bytes, 72 bits the
+/// beginning of the SHA-256 of all its other bytes.
 class ArchiveDigest {
  public:
   /// Takes the bytes of an archive as they come; whatever UUID they hold is left out.

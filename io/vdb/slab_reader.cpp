@@ -18,7 +18,7 @@ namespace vdbdither {
 
 namespace {
 
-/// Only the grids of `grids` that `names` asks for.
+/// Returns the grids of `grids` whose names are in `names`.
 void keepNamed(Grids& grids, const std::vector<std::string>& names) {
   if (names.empty()) return;
   Grids kept;
@@ -132,7 +132,7 @@ void SlabReader::readToEnd() {
   while (isPipe() && !ended_) ended_ = !frames_->next();
 }
 
-/// Frames come in rising z, and so do the cores that are asked of a pipe: slabs below `core` are
+/// Frames arrive in rising z, and the cores are requested in rising z: slabs below `core` are
 /// dropped, missing ones are read.
 void SlabReader::takeFrames(ZRange core) {
   std::erase_if(slabs_, [&](const Slab& slab) { return slab.core.end <= core.begin; });

@@ -64,8 +64,8 @@ std::optional<double> picoGkVoxelMm(const openvdb::GridBase& grid);
 std::optional<Lattice> latticeOf(const openvdb::GridBase& grid);
 
 /// The lattice, printer and history that metadata and transforms state. Files of other tools get
-/// the lattice of their first grid and the box of their active voxels. Throws DataError where a
-/// grid's transform is no scaling, or where grids disagree.
+/// the lattice of their first grid and the box of their active voxels. Throws DataError if the
+/// transform of a grid is not a scaling, or if grids disagree.
 Schema schemaOf(const VdbContents& contents, const std::string& where);
 
 /// Contents that carry `schema`: its metadata, the lattice's box, and the tool's name as `creator`.

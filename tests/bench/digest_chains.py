@@ -250,7 +250,7 @@ def slices():
                                        "vdbdither slice-import out -o out0.vdb; "
                                        "vdbdither slice-import out --layers 17:33 -o out1.vdb",
         "slice-import of a damaged stack": "vdbdither slice-export -i layered.vdb out && "
-                                           "echo >> out/slice_00003.png && vdbdither slice-import out -o out.vdb",
+                                           "echo >> out/slice_00003.png && vdbdither slice-import out --edited -o out.vdb",
     }
     return chains
 

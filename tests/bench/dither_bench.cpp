@@ -125,8 +125,22 @@ void best(benchmark::State& state, bool given_normals, bool guarded) {
   reportPerVoxel(state, slab, pitch_mm.length());
 }
 
+/// The amplitudes of all normals that there are, on the lattice whose pitch is `state.range(0)`
+/// times this one.
 void adaptedAmplitude(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(AdaptedAmplitude(pitch_mm, 0.05));
+  constexpr int per_side = 300;
+  for (auto _ : state) {
+    const AdaptedAmplitude adapted(pitch_mm * static_cast<double>(state.range(0)), 0.05);
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int n = 0; n < per_side * per_side; ++n) {
+        openvdb::Vec3s normal;
+        normal[axis] = 1;
+        normal[(axis + 1) % 3] = std::pow(static_cast<float>(n / per_side) / per_side, 2.0F);
+        normal[(axis + 2) % 3] = std::pow(static_cast<float>(n % per_side) / per_side, 2.0F);
+        benchmark::DoNotOptimize(adapted(normal));
+      }
+    }
+  }
 }
 
 void normals(benchmark::State& state) {
@@ -164,7 +178,7 @@ BENCHMARK_CAPTURE(dither, voxel, DitherAt::voxel, true, false) AT_HEIGHTS;
 BENCHMARK_CAPTURE(best, best, true, true) AT_HEIGHTS;
 BENCHMARK_CAPTURE(best, best_own_normals, false, true) AT_HEIGHTS;
 BENCHMARK_CAPTURE(best, best_unguarded, true, false) AT_HEIGHTS;
-BENCHMARK(adaptedAmplitude)->Unit(benchmark::kMillisecond);
+BENCHMARK(adaptedAmplitude)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
 BENCHMARK(normals) AT_HEIGHTS;
 BENCHMARK(surfaceVoxels) AT_HEIGHTS;
 BENCHMARK(interlaced) AT_HEIGHTS;

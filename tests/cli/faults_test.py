@@ -48,7 +48,7 @@ class FullDisk(ProgramTest):
             old.write_bytes(b"old")
         else:
             old.mkdir()
-            (old / "manifest.json").write_bytes(b"old")
+            (old / "manifest.json").write_bytes(b'{"slices": []}')
         before = self.listing()
         filled = 0
         for size in sizes:
@@ -138,17 +138,6 @@ class InTheWay(ProgramTest):
                 ("measure", "part.stl", "--reference", "part.stl", "--report", f"{place}/out.json"),
                 ("measure", "part.stl", "--reference", "part.stl", "--map", f"{place}/out.ply"))
 
-    def as_nobody(self):
-        """The keywords that run the program as a user without rights. Skips the test where only root may run the program."""
-        keywords = {"user": 65534, "group": 65534, "extra_groups": []}
-        try:
-            runs = self.run_program("--version", **keywords).returncode == 0
-        except PermissionError:
-            runs = False
-        if not runs:
-            self.skipTest("only root may run the program where it lies")
-        return keywords
-
     def test_a_read_only_folder_is_reported(self):
         place = self.folder / "locked"
         place.mkdir()
@@ -161,6 +150,18 @@ class InTheWay(ProgramTest):
             keywords = self.as_nobody()
         for arguments in self.sinks("locked"):
             self.refuse(1, "Permission denied", *arguments, **keywords)
+
+    def test_a_read_only_stack_is_not_replaced(self):
+        self.succeed("slice-export", "-i", "part.vdb", "out")
+        (self.folder / "out").chmod(0o555)
+        self.addCleanup((self.folder / "out").chmod, 0o755)
+        keywords = {}
+        if os.geteuid() == 0:
+            self.folder.chmod(0o777)
+            (self.folder / "part.vdb").chmod(0o644)
+            keywords = self.as_nobody()
+        self.refuse(1, "slice-export: cannot replace 'out': Permission denied", "slice-export", "-i", "part.vdb", "out", "--overwrite",
+                    **keywords)
 
     def test_an_unreadable_file_is_reported(self):
         keywords = {}
@@ -238,7 +239,7 @@ class Killed(ProgramTest):
                 process.wait()
                 left = self.hidden()
                 self.assertEqual(len(left), 1)
-                self.assertTrue(re.fullmatch(rf"\.{target}\.partial-{process.pid}", left[0]), left)
+                self.assertTrue(re.fullmatch(rf"\.{target}\.partial-[0-9a-f]{{8}}-{process.pid}", left[0]), left)
                 hidden = tuple(left)
                 self.assertEqual([entry for entry in self.listing() if not entry[0].startswith(hidden)], before)
                 self.succeed(*small)

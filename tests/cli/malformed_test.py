@@ -69,6 +69,34 @@ def spoilt(value):
     return [((value, *a[1:]), b, c), *rest]
 
 
+def attributed_stl(triangles, size):
+    """Returns a binary STL of which `size` bytes of attributes follow each record."""
+    plain = binary_stl(triangles)
+    return plain[:84] + b"".join(plain[84 + 50 * i:132 + 50 * i] + struct.pack("<H", size) + bytes([7] * size)
+                                 for i in range(len(triangles)))
+
+
+def faces_first(content):
+    """Returns a mesh of text with its vertices after its faces."""
+    lines = content.splitlines(keepends=True)
+    if content.startswith(b"ply"):
+        head, end = lines[:2], lines.index(b"end_header\n")
+        vertices = end + 1 + int(lines[2].split()[-1])
+        return b"".join(head + lines[6:end] + lines[2:6] + lines[end:end + 1] + lines[vertices:] + lines[end + 1:vertices])
+    return b"".join(sorted(lines))
+
+
+def strip(twisted):
+    """Returns a hoop, or a Moebius strip."""
+    def point(turn, across):
+        angle, tilt = turn * math.tau / 60, turn * math.pi / 60 if twisted else math.pi / 2
+        radius = 5 + across * math.cos(tilt)
+        return radius * math.cos(angle), radius * math.sin(angle), across * math.sin(tilt)
+    corners = [(point(i, -1), point(i, 1)) for i in range(60)]
+    corners.append(corners[0][::-1] if twisted else corners[0])
+    return [triangle for (a, b), (c, d) in zip(corners, corners[1:]) for triangle in ((a, c, d), (a, d, b))]
+
+
 WHOLE_STL, WHOLE_TEXT, WHOLE_OBJ, WHOLE_PLY = binary_stl(BOX), ascii_stl(BOX), obj(BOX), ply(BOX)
 NAN, INF = math.nan, math.inf
 
@@ -95,6 +123,25 @@ MENDED = {
     "missing-face.stl": (binary_stl(BOX[1:]), True),
     "inside-out.stl": (binary_stl([triangle[::-1] for triangle in BOX]), True),
     "flat-face.stl": (binary_stl([*BOX, (BOX[0][0],) * 3]), True),
+    "attributes.stl": (attributed_stl(BOX, 2), False),
+    "two-files.stl": (binary_stl(BOX[:6]) + binary_stl(BOX[6:]), True),
+    "end-loop.stl": (WHOLE_TEXT.replace(b"endloop", b"end loop"), False),
+    "end-all.stl": (WHOLE_TEXT.replace(b"end", b"END "), False),
+    "glued.stl": (WHOLE_TEXT.replace(b"endsolid box", b"endsolidbox"), False),
+    "colours.stl": (WHOLE_TEXT.replace(b"facet normal", b"color 0.5 0.5 0.5\n# red\nfacet normal"), False),
+    "facets-in-lines.stl": (WHOLE_TEXT.replace(b"\n", b" ").replace(b" facet", b"\nfacet"), False),
+    "one-line.stl": (WHOLE_TEXT.replace(b"\n", b" "), False),
+    "no-end.stl": (WHOLE_TEXT.replace(b"endsolid box\n", b""), True),
+    "commented.obj": (WHOLE_OBJ.replace(b"\n", b" # 1\n"), False),
+    "glued-comments.obj": (WHOLE_OBJ.replace(b"\n", b"#1\n"), False),
+    "faces-first.obj": (faces_first(WHOLE_OBJ), False),
+    "continued.obj": (WHOLE_OBJ.replace(b"f ", b"f \\\n"), False),
+    "faces-first.ply": (faces_first(WHOLE_PLY), False),
+    "blank.ply": (WHOLE_PLY.replace(b"ply\n", b"ply \nobj_info x\n"), False),
+    "more-on-lines.ply": (WHOLE_PLY.replace(b"\n3 ", b" 0 0\n3 ").replace(b"end_header 0 0", b"end_header"), True),
+    "int64.ply": (WHOLE_PLY.replace(b"uchar int", b"uchar int64"), False),
+    "return.binary.ply": (binary_ply(BOX).replace(b"end_header\n", b"end_header\r\n"), False),
+    "no-return.binary.ply": (binary_ply(BOX).replace(b"\n", b"\r\n", 9).replace(b"end_header\r", b"end_header"), False),
 }
 
 # Files that must be refused.
@@ -118,7 +165,10 @@ REFUSED = {
     "cut.ply": WHOLE_PLY[:-20], "cut.binary.ply": binary_ply(BOX)[:-5],
     "noise.stl": bytes(range(256)) * 4, "zeros.stl": bytes(1000), "text.stl": b"this is no mesh\n", "page.stl": b"<html></html>\n",
     "broken.3mf": b"PK\x03\x04 and no more", "a.glb": b"glTF\x02\0\0\0", "a.off": b"OFF\n8 12 0\n",
-    "one-triangle.stl": binary_stl(BOX[:1]), "flat.stl": binary_stl([(BOX[0][0],) * 3]),
+    "one-triangle.stl": binary_stl(BOX[:1]), "flat.stl": binary_stl([(BOX[0][0],) * 3]), "plane.obj": obj([*BOX[:2], *BOX[:2]]),
+    "moebius.stl": binary_stl(strip(True)), "hoop.stl": binary_stl(strip(False)),
+    "longer-records.stl": binary_stl(BOX)[:84] + b"".join(binary_stl(BOX)[84 + 50 * i:134 + 50 * i] + b"xy" for i in range(12)),
+    "undeclared-colours.binary.ply": binary_ply(BOX)[:-156] + b"".join(binary_ply(BOX)[-156:][13 * i:13 * i + 13] + b"rgb" for i in range(12)),
 }
 
 
@@ -174,10 +224,29 @@ class Malformed(ProgramTest):
                 with self.subTest(kind=kind, part=part):
                     self.outcome(f"cut.{kind}")
 
+    def test_sparse_files_are_refused_by_their_heads(self):
+        header = b"ply\nformat binary_little_endian 1.0\nelement vertex 400000000\nproperty float x\nproperty float y\nproperty float z\n"
+        for name, content, why in (("zeros.stl", b"", "holds no triangles but zeros"),
+                                   ("box.stl", WHOLE_STL, "its header announces 12 triangles, which are not what"),
+                                   ("many.ply", header + b"end_header\n", "counts more than the file holds"),
+                                   ("many.off", b"OFF\n400000000 1 0\n", "more than the file holds")):
+            with self.subTest(name=name):
+                (self.folder / name).write_bytes(content)
+                os.truncate(self.folder / name, 2 << 30)
+                process = self.start("mesh2sdf", name, *MIMAKI, "-o", "out.vdb")
+                said = process.stderr.read().decode()
+                _, status, usage = os.wait4(process.pid, 0)
+                process.returncode = os.waitstatus_to_exitcode(status)
+                self.assertEqual(process.returncode, 1, said)
+                self.assertIn(why, said)
+                if not os.environ.get("VDBDITHER_SANITIZER"):
+                    self.assertLess(usage.ru_maxrss, 500 << 10)
+                self.assertFalse((self.folder / "out.vdb").exists())
+
     def test_an_empty_part_is_reported(self):
-        # One corner is so far away that the other corners coincide.
-        (self.folder / "far.stl").write_bytes(binary_stl(spoilt(3e38)))
-        self.assertIn("warning: no voxel is printed; ", self.outcome("far.stl"))
+        # It lies between the centres of two layers.
+        (self.folder / "thin.stl").write_bytes(binary_stl(meshes.box((2, 2, 0.0002), (0, 0, 0.011))))
+        self.assertIn("warning: no voxel is printed; ", self.outcome("thin.stl"))
 
     def test_an_archive_of_a_mesh_is_refused(self):
         with zipfile.ZipFile(self.folder / "part.3mf", "w") as archive:

@@ -1,6 +1,7 @@
 """Tests the tool ssim, and pictures of the whole program."""
 
 import json
+import os
 import unittest
 
 import meshes
@@ -89,7 +90,7 @@ class Ssim(ProgramTest):
         Image.new("RGBA", (20, 20)).save(self.folder / "nothing.png")
         self.refuse(1, "ssim: 'wide.png' has 50 x 30 pixels and 'a.png' 40 x 30; only pictures of one size can be compared",
                     "ssim", "a.png", "wide.png")
-        self.refuse(1, "'tiny.png' has 10 x 10 pixels; 11 x 11 is the least", "ssim", "tiny.png", "tiny.png")
+        self.refuse(1, "'tiny.png' has 10 x 10 pixels; the minimum is 11 x 11", "ssim", "tiny.png", "tiny.png")
         self.refuse(1, "'nothing.png' shows nothing: all of it is transparent", "ssim", "nothing.png", "nothing.png")
         self.refuse(1, "no such file 'none.png'", "ssim", "a.png", "none.png")
         self.refuse(2, "--pixel: '0' is not accepted; the length must be greater than 0 mm", "ssim", "a.png", "a.png", "--pixel", "0")
@@ -97,6 +98,26 @@ class Ssim(ProgramTest):
         (self.folder / "maps").mkdir()
         (self.folder / "maps/old").touch()
         self.refuse(2, "exists; --overwrite replaces it", "ssim", "a.png", "a.png", "--maps", "maps")
+
+    def test_maps_replace_maps_and_nothing_else(self):
+        self.random_picture("a.png", 1)
+        maps = ("ssim", "a.png", "a.png", "--maps", "maps", "--overwrite")
+        self.succeed(*maps)
+        self.succeed(*maps)
+        (self.folder / "maps/notes.txt").touch()
+        self.refuse(2, "'maps' holds 'notes.txt', which was not written with the rest; move it elsewhere, or name another folder",
+                    *maps)
+
+    def test_pictures_that_take_too_much_are_refused_before_they_are_read(self):
+        self.random_picture("a.png", 1)
+        Image.new("1", (60000, 60000)).save(self.folder / "large.png")
+        (self.folder / "long.png").touch()
+        os.truncate(self.folder / "long.png", 1 << 40)
+        os.mkfifo(self.folder / "pipe.png")
+        for name, message in (("large.png", "'large.png' has 60000 x 60000 pixels; at most 67108864 are read"),
+                              ("long.png", "'long.png' has 1099511627776 bytes; at most 536870912 are read"),
+                              ("pipe.png", "'pipe.png' is not an ordinary file")):
+            self.refuse(1, message, "ssim", "a.png", name)
 
 
 if __name__ == "__main__":

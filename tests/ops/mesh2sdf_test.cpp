@@ -188,13 +188,19 @@ TEST_F(Mesh2Sdf, RefusesLooseTrianglesWhereItMayNotGuess) {
             "out");
 }
 
-TEST_F(Mesh2Sdf, RefusesTrianglesThatHintAtNothing) {
-  Mesh loose = test::boxMesh({1, 2, 3}, {2, 2.5, 3.25});
-  loose.triangles.resize(1);
-  writeObj(path_, loose);
+TEST_F(Mesh2Sdf, RefusesWhatCannotBoundAVolumeByTheNameOfItsFile) {
+  const std::string solid = path_ + ".solid.obj";
+  writeObj(solid, test::boxMesh({0, 0, 0}, {1, 1, 1}));
+  Mesh flat = test::boxMesh({1, 2, 3}, {2, 2.5, 3.25});
+  const std::string remedy = "; give the surface a thickness in a mesh editor first";
+  flat.triangles.resize(2);
+  writeObj(path_, flat);
   EXPECT_EQ(refusal<DataError>({"--pitch", "0.1,0.1,0.05"}),
-            "the triangles enclose nothing: 3 of their 3 sides meet no other, and their winding "
-            "number is above one half nowhere; join them in a mesh editor first");
+            "'" + path_ + "': bounds no volume: it has only 2 triangles with an area, and 4 are needed" + remedy);
+  flat.triangles.insert(flat.triangles.end(), flat.triangles.begin(), flat.triangles.end());
+  writeObj(path_, flat);
+  EXPECT_EQ(refusal<DataError>({solid, "--pitch", "0.1,0.1,0.05"}),
+            "'" + path_ + "': bounds no volume: all its corners lie in one plane" + remedy);
 }
 
 TEST_F(Mesh2Sdf, GuessesOnlyThoseOfSeveralFilesThatAreLoose) {

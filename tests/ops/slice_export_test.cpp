@@ -271,6 +271,22 @@ TEST(SliceExport, OverwritingReplacesAStackAndNothingElse) {
   Export({scratch / "out", "--overwrite"}).run(smallJob());
   EXPECT_FALSE(fs::exists(scratch / "out/old00000.png"));
   EXPECT_TRUE(fs::exists(scratch / "out/slice_00000.png"));
+  scratch.write("out/notes.txt", "mine");
+  EXPECT_THAT(
+      [&] {
+        Export({scratch / "out", "--overwrite"}).run(smallJob());
+      },
+      ThrowsMessage<UsageError>("'" + (scratch / "out").string() +
+                                "' holds 'notes.txt', which was not written with the rest; move it "
+                                "elsewhere, or name another folder"));
+  fs::remove(scratch / "out/notes.txt");
+  scratch.write("out/manifest.json", "no JSON");
+  EXPECT_THAT(
+      [&] {
+        Export({scratch / "out", "--overwrite"}).run(smallJob());
+      },
+      ThrowsMessage<UsageError>(HasSubstr("; which files are the stack's is unknown, so delete the "
+                                          "folder or name another one")));
   fs::remove(scratch / "out/manifest.json");
   EXPECT_THAT(
       [&] {
@@ -313,8 +329,75 @@ TEST(SliceExport, RefusesWhatItCannotSlice) {
   EXPECT_THAT(planned(smallJob(), {"--background", "grey"}),
               ThrowsMessage<UsageError>(
                   "--background: 'grey' is no colour; give #rrggbb or r,g,b of 0 to 255"));
-  EXPECT_THAT(planned(smallJob(), {"--prefix", "a/b"}),
-              ThrowsMessage<UsageError>("--prefix: 'a/b' must not hold a '/'"));
+  EXPECT_THAT(
+      planned(smallJob(), {"--prefix", "a/b"}),
+      ThrowsMessage<UsageError>("--prefix: the name of a slice, 'a/b00000.png', contains '/'"));
+  EXPECT_THAT(planned(smallJob(), {"--prefix", std::string(247, 'p')}),
+              ThrowsMessage<UsageError>(HasSubstr("has 256 bytes; the maximum is 255")));
+}
+
+TEST(SliceExport, NamesOfFilesMayBeAsLongAsTheFileSystemAllows) {
+  const test::ScratchFolder scratch;
+  const std::string prefix(246, 'p');
+  const std::string folder(255, 'f');
+  Export({scratch / folder, "--prefix", prefix}).run(smallJob());
+  EXPECT_TRUE(fs::exists(scratch / (folder + "/" + prefix + "00000.png")));
+}
+
+Job named(const std::string& first, const std::string& second) {
+  Job job = smallJob();
+  job.schema.metadata[materials_key] =
+      toJson({{first, {240, 240, 240, 255}}, {second, {26, 26, 29, 255}}});
+  return job;
+}
+
+TEST(SliceExport, NamesOfMaterialsDoNotLeaveTheStack) {
+  const test::ScratchFolder scratch;
+  const std::vector<std::pair<std::string, std::string>> problems{
+      {"../xx", "contains '/'"},
+      {(scratch / "xx").string(), "contains '/'"},
+      {"..", "is '..'"},
+      {"", "is empty"},
+      {"a\\b", "contains '\\'"},
+      {"a\nb", "contains the unprintable character U+000A"},
+      {std::string(256, 'a'), "has 256 bytes; the maximum is 255"},
+      {"black", "is that of another one, or of a file of the stack"},
+      {"BLACK", "is that of another one, or of a file of the stack"},
+      {"manifest.json", "is that of another one, or of a file of the stack"},
+      {"preview.png", "is that of another one, or of a file of the stack"}};
+  for (const auto& problem : problems) {
+    for (const std::string format : {"png1", "tiff1"}) {
+      for (const char* target : {"out", "out.zip"}) {
+        const std::string& name = problem.first;
+        const Job job = named("black", name);
+        EXPECT_THAT(
+            [&] {
+              Export({scratch / target, "--format", format}).sink().plan(job.schema);
+            },
+            ThrowsMessage<DataError>(
+                format + " has a folder for each material, and the name of the material '" + name +
+                "' " + problem.second +
+                "; give it another one with material-assign, or take exr, png, png8 or tiff"));
+      }
+    }
+  }
+  EXPECT_TRUE(fs::is_empty(scratch.path()));
+}
+
+TEST(SliceExport, FormatsWithoutFoldersOfMaterialsTakeAnyName) {
+  const test::ScratchFolder scratch;
+  for (const char* format : {"png", "png8", "tiff", "exr"}) {
+    Export({scratch / format, "--format", format}).run(named("../xx", "a/b"));
+    for (const auto& [name, bytes] : test::filesUnder(scratch / format))
+      EXPECT_EQ(name.find('/'), name.npos) << name;
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), {}), 4);
+}
+
+TEST(SliceExport, AnArchiveIsNamedInAnyCase) {
+  const test::ScratchFolder scratch;
+  Export({scratch / "out.ZIP"}).run(smallJob());
+  EXPECT_TRUE(fs::is_regular_file(scratch / "out.ZIP"));
 }
 
 TEST(SliceExport, AnUnknownMaterialOrAMissingLayerIsAnError) {

@@ -63,10 +63,13 @@ void exported(const Job& job, const std::vector<std::string>& arguments) {
 }
 
 struct Import {
-  explicit Import(const std::string& path) : made(findOperator("slice-import").make()) {
+  explicit Import(const std::string& path, bool edited = false)
+      : made(findOperator("slice-import").make()) {
     Options options;
     made->declare(options);
-    options.parse(std::vector<std::string>{path});
+    std::vector<std::string> arguments{path};
+    if (edited) arguments.emplace_back("--edited");
+    options.parse(arguments);
     made->setReporter(&listener);
   }
   Source& source() { return static_cast<Source&>(*made); }
@@ -163,19 +166,38 @@ TEST_F(SliceImport, AStackOfSolidHasNoMaterials) {
               bytesOf(solidOf(materials.grids.at("material"))));
 }
 
-TEST_F(SliceImport, WarnsOnceOfSlicesThatWereEdited) {
+TEST_F(SliceImport, TakesSlicesThatWereEditedOnDemandAndWarnsOnce) {
   exported(job(), {scratch_ / "out", "--keep-blank"});
   const SpanImage blank = test::spanImage(182, 154, [](int, int) { return 0U; });
   const std::vector<std::uint32_t> palette = {rgba(0, 0, 0)};
   for (const char* name : {"out/slice_00003.png", "out/slice_00004.png"})
     writeFile(scratch_ / name, encodePng(blank, {PngPixels::rgba8, palette, 0, 0}), name);
-  Import import(scratch_ / "out");
+  EXPECT_THAT(
+      [&] {
+        Import strict(scratch_ / "out");
+        static_cast<void>(strict.source().run(strict.source().plan().lattice.layers()));
+      },
+      ThrowsMessage<DataError>(HasSubstr(
+          " was changed after slice-export wrote it: its digest differs; make the stack again with "
+          "slice-export, or give --edited to take it as it is")));
+  Import import(scratch_ / "out", true);
   const Schema schema = import.source().plan();
   const auto solid = import.source().run(schema.lattice.layers()).at("solid");
   EXPECT_FALSE(openvdb::gridConstPtrCast<openvdb::BoolGrid>(solid)->tree().isValueOn({10, 14, -8}));
   EXPECT_TRUE(openvdb::gridConstPtrCast<openvdb::BoolGrid>(solid)->tree().isValueOn({10, 14, 0}));
   ASSERT_THAT(import.listener.warnings, SizeIs(1));
-  EXPECT_THAT(import.listener.warnings[0], HasSubstr("is not as its manifest describes it"));
+  EXPECT_THAT(import.listener.warnings[0], HasSubstr("its digest differs; it is taken as it is"));
+}
+
+TEST_F(SliceImport, DeclaresTheStackAsAnInput) {
+  exported(job(), {scratch_ / "out"});
+  Import import(scratch_ / "out");
+  const Schema schema = import.source().plan();
+  const std::vector<Input*> inputs = import.source().inputs();
+  ASSERT_THAT(inputs, SizeIs(1));
+  EXPECT_EQ(inputs[0]->path(), scratch_ / "out");
+  EXPECT_FALSE(inputs[0]->isPipe());
+  EXPECT_EQ(inputs[0]->schema().lattice, schema.lattice);
 }
 
 TEST_F(SliceImport, RefusesAStackThatIsNoneOrLacksSlices) {
@@ -200,7 +222,7 @@ TEST_F(SliceImport, RefusesAStackThatIsNoneOrLacksSlices) {
 TEST_F(SliceImport, RefusesSlicesOfOtherSizesAndUnknownColours) {
   exported(job(), {scratch_ / "out", "--keep-blank"});
   const auto whole = [&] {
-    Import import(scratch_ / "out");
+    Import import(scratch_ / "out", true);
     const Schema schema = import.source().plan();
     static_cast<void>(import.source().run(schema.lattice.layers()));
   };
@@ -237,7 +259,7 @@ TEST_F(SliceImport, RefusesMaterialsOfOneColourAndVoxelsOfTwoMaterials) {
                 fs::copy_options::overwrite_existing);
   EXPECT_THAT(
       [&] {
-        Import import(scratch_ / "bits");
+        Import import(scratch_ / "bits", true);
         const Schema schema = import.source().plan();
         static_cast<void>(import.source().run(schema.lattice.layers()));
       },

@@ -62,9 +62,10 @@ void expectEveryPrefixIsReadOrRefused(const std::string& bytes, bool knows_its_e
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     const std::string message = refusal(bytes.substr(0, size));
     EXPECT_EQ(message.find('\n'), std::string::npos);
-    if (knows_its_end && message == "read") {
-      EXPECT_EQ(parse(bytes.substr(0, size)).triangles.size(), triangles);
-    }
+    if (!knows_its_end || message != "read") continue;
+    Warnings warnings;
+    const std::size_t read = parse(bytes.substr(0, size), &warnings).triangles.size();
+    EXPECT_TRUE(read == triangles || !warnings.empty()) << size;
   }
 }
 

@@ -26,7 +26,7 @@ void expectSame(const Mesh& mesh, const Mesh& expected);
 Mesh floatPart();
 
 /// Expects that every prefix of `bytes` is read or refused in one line.
-/// @param knows_its_end  whether what is read must then be the whole mesh
+/// @param knows_its_end  whether what is read without a warning must then be the whole mesh
 void expectEveryPrefixIsReadOrRefused(const std::string& bytes, bool knows_its_end);
 
 /// Expects that `bytes` are read as a sound mesh or refused in one line whatever is changed in

@@ -2,8 +2,10 @@
 
 import os
 import pathlib
+import signal
 import subprocess
 import tempfile
+import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -13,6 +15,26 @@ PROGRAM = pathlib.Path(os.environ.get("VDBDITHER_PROGRAM", ROOT / "build/release
 PATIENCE = 10 if os.environ.get("VDBDITHER_SANITIZER") else 1
 
 MIMAKI = ("--printer", "mimaki-3duj-553")
+
+
+def start_program(test, *arguments, **keywords):
+    """Starts a run of `test`, and returns when it notes signals. Signals are as at a terminal."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+    def restore():
+        for number in numbers:
+            signal.signal(number, signal.SIG_DFL)
+
+    process = test.start(*arguments, preexec_fn=restore, **keywords)
+    deadline = time.monotonic() + 60 * PATIENCE
+    while True:
+        status = pathlib.Path(f"/proc/{process.pid}/status").read_text()
+        noted = int(next(line for line in status.splitlines() if line.startswith("SigCgt:")).split()[1], 16)
+        if all(noted & 1 << number - 1 for number in numbers):
+            return process
+        test.assertIsNone(process.poll(), arguments)
+        test.assertLess(time.monotonic(), deadline)
+        time.sleep(0.002)
 
 
 class ProgramTest(unittest.TestCase):
@@ -70,3 +92,14 @@ class ProgramTest(unittest.TestCase):
     def listing(self):
         """Returns all files in the folder with their sizes, including hidden files."""
         return sorted((str(path.relative_to(self.folder)), path.stat().st_size) for path in self.folder.rglob("*"))
+
+    def as_nobody(self):
+        """The keywords that run the program as a user without rights. Skips the test where only root may run the program."""
+        keywords = {"user": 65534, "group": 65534, "extra_groups": []}
+        try:
+            runs = self.run_program("--version", **keywords).returncode == 0
+        except PermissionError:
+            runs = False
+        if not runs:
+            self.skipTest("only root may run the program where it lies")
+        return keywords

@@ -25,7 +25,7 @@ struct OutputEstimate {
 };
 
 /// The measured costs that operators put into `Work`, all in one place: they were measured together
-/// (docs/performance.md) and are to be measured again together.
+/// (docs/performance.md) and must be measured again together.
 namespace cost {
 
 // Microseconds for each leaf.

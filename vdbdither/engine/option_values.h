@@ -36,8 +36,8 @@ double parseLengthMm(std::string_view text, const Range& range = {});
 /// The shortest text that reads back as the same double.
 std::string shortestText(double value);
 
-/// `word` as a shell and splitWords read it: as it stands where it is plain, else in quotes, and
-/// what is not printable as escapes, so that the result is always a single line of UTF-8.
+/// Returns `word` as a shell and splitWords read it: unchanged if it is plain, otherwise in quotes,
+/// with what is not printable as escapes, so that the result is always a single line of UTF-8.
 std::string quotedForShell(std::string_view word);
 
 /// The candidate nearest to `word` by edit distance, or an empty text where none is near.

@@ -76,7 +76,7 @@ Notation<Vector> triples(const Notation<typename Vector::ValueType>& one, const 
           }};
 }
 
-/// A text without an own notation; one that is empty is no value.
+/// The value of an option that is a plain text; an empty text is no value.
 Texts valueOf(const std::string& text) { return text.empty() ? Texts{} : Texts{text}; }
 
 std::string firstOf(const Texts& texts) { return texts.empty() ? "" : texts.front(); }

@@ -2,19 +2,21 @@
 
 #include <algorithm>
 #include <future>
+#include <system_error>
 
 #include <tbb/global_control.h>
 
 #include "vdbdither/engine/planning.h"
+#include "vdbdither/model/errors.h"
 #include "vdbdither/model/layers.h"
 
 namespace vdbdither {
 
 namespace {
 
-/// `slab`, one of the layers `incoming`, for a filter that wants the layers `window`: at both ends
-/// of `incoming` it takes the empty layers of its outermost leaves along, so that the next slab
-/// begins with a leaf.
+/// Returns `slab` for a filter that reads the layers `window`. At both ends of `incoming`, the
+/// layers of the job, the core is widened to whole leaves, so that the next slab begins with a
+/// leaf. The added layers are empty.
 Slab widened(Slab slab, ZRange incoming, ZRange window) {
   const ZRange core = slab.core;
   if (core.begin == incoming.begin) slab.core.begin = alignedToLeaves(core).begin;
@@ -86,11 +88,16 @@ void Pipeline::readInputsToEnd() {
   std::vector<std::future<void>> readers;
   for (Worker& worker : workers_) {
     if (worker.plan.inputs.empty()) continue;
-    readers.push_back(std::async(std::launch::async, [&worker] {
+    const auto read = [&worker] {
       worker.stage.monitor().timed([&] {
         for (Input* input : worker.stage.inputs()) input->readToEnd();
       });
-    }));
+    };
+    try {
+      readers.push_back(std::async(std::launch::async, read));
+    } catch (const std::system_error& error) {
+      throw DataError("cannot start a thread: " + error.code().message());
+    }
   }
   for (std::future<void>& reader : readers) reader.get();
 }

@@ -26,8 +26,8 @@ class Pipeline {
   /// Carries out the plan and publishes. Throws DataError; then nothing half-made remains.
   void run();
 
-  /// Reads the pipes that feed a planned job to their end, so that their writers finish cleanly. A
-  /// part of `run`; called in its place if nothing is to be made. Throws DataError if a writer
+  /// Reads the pipes that feed a planned job to their end, so that their writers finish cleanly.
+  /// `run` does this too; call it instead of `run` if nothing is made. Throws DataError if a writer
   /// fails.
   void readInputsToEnd();
 

@@ -9,7 +9,7 @@
 
 namespace vdbdither {
 
-/// Plans a chain without computing a voxel: asks the operators in order, then works out from the
+/// Plans a chain without computing a voxel: plans the operators in order, then derives from the
 /// end which grids and layers each stage must give, chooses the height of the slabs, and estimates
 /// memory, time and disk. Throws UsageError or DataError for everything that can be refused now; a
 /// job that does not fit into memory or onto the disk is refused unless `options.explain` is set.

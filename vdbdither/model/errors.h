@@ -11,7 +11,7 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The command line asks for something that cannot be: exit code 2.
+/// The command line requests something impossible: exit code 2.
 class UsageError : public Error {
  public:
   using Error::Error;

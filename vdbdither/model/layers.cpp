@@ -173,7 +173,7 @@ void copyLayers(std::span<const GridLayers> pieces, ZRange wanted, GridT& target
   }
 }
 
-/// Whether an internal node has nothing but background outside `range`.
+/// Returns whether an internal node has only background outside `range`.
 template <typename Node, typename Value>
 bool endsWithin(const Node& node, ZRange range, const Value& background) {
   bool ends = true;

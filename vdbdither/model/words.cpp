@@ -1,5 +1,6 @@
 #include "vdbdither/model/words.h"
 
+#include <algorithm>
 #include <cstddef>
 
 namespace vdbdither {
@@ -11,6 +12,12 @@ std::string alternatives(std::span<const std::string> words) {
     text += words[i];
   }
   return text;
+}
+
+bool equalsIgnoringCase(std::string_view word, std::string_view lower) {
+  return std::equal(word.begin(), word.end(), lower.begin(), lower.end(), [](char c, char wanted) {
+    return (c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c) == wanted;
+  });
 }
 
 }  // namespace vdbdither

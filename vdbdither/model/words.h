@@ -2,10 +2,14 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace vdbdither {
 
 /// Returns `a`, `a or b`, `a, b or c`: what a refusal lists.
 std::string alternatives(std::span<const std::string> words);
+
+/// Whether two ASCII words are equal but for upper and lower case; `lower` is lower case.
+bool equalsIgnoringCase(std::string_view word, std::string_view lower);
 
 }  // namespace vdbdither

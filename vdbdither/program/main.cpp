@@ -24,6 +24,8 @@
 #include "vdbdither/model/printable.h"
 #include "vdbdither/model/unexpected.h"
 #include "vdbdither/program/console.h"
+#include "vdbdither/program/ending.h"
+#include "vdbdither/program/threads.h"
 
 namespace vdbdither {
 namespace {
@@ -37,7 +39,7 @@ std::string helpOn(const std::string& verb) {
   return helpText(pageOf(findOperator(verb)));
 }
 
-/// Refuses a word that is no operator but close to the name of a tool.
+/// Refuses a word that is not an operator but resembles the name of a tool.
 void refuseNearTool(const std::string& word) {
   std::vector<std::string> names;
   for (const OperatorInfo* info : registeredOperators()) names.emplace_back(info->name);
@@ -120,6 +122,8 @@ void runReported(Job& job, Console& console, Clock::time_point start, const Func
 }
 
 void runTool(ToolRun&& tool) {
+  watchForInterrupts();
+  const GrantedThreads threads;
   const Clock::time_point start = Clock::now();
   Console console;
   console.begin(tool.options().quiet || tool.options().verbose, 0, 0);
@@ -131,6 +135,8 @@ void runChain(const std::vector<Step>& steps) {
   const RunOptions& options = pipeline.options();
   if (const OperatorInfo* info = pipeline.helpWanted())
     return printData(helpText(pageOf(*info)).c_str());
+  watchForInterrupts();
+  const GrantedThreads threads;
   const Clock::time_point start = Clock::now();
   Console console;
   console.begin(options.quiet, 0, 0);
@@ -176,6 +182,7 @@ bool namesItsVerb(const std::string& message) {
 
 int guardedMain(int argc, char** argv) {
   const auto fail = [](const std::string& message, int code) {
+    claimEnding(code);
     std::fprintf(stderr, "vdbdither%s %s\n", namesItsVerb(message) ? "" : ":",
                  printable(message).c_str());
     return code;
@@ -184,15 +191,18 @@ int guardedMain(int argc, char** argv) {
   // system time.
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
   try {
+    openStandardDescriptors();
     setStandardOutputAside();
     // Libraries write warnings there, in their own words.
     std::cerr.rdbuf(nullptr);
     noteInterrupts();
     initializeVdb();
     runProgram(argc, argv);
+    claimEnding(0);
     return 0;
   } catch (const Interrupted& error) {
-    fail(error.what(), 0);
+    claimEnding(128 + error.signal());
+    printLastLine(error.what());
     return 128 + error.signal();
   } catch (const UsageError& error) {
     return fail(error.what(), 2);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <vector>
 
 #include <openvdb/openvdb.h>
@@ -28,8 +30,12 @@ struct FacetDither {
 /// are more visible than grain, so the variance of the stairs counts three times. Of the
 /// combinations tried, the one is chosen whose sum exceeds the minimum by the smallest factor, at σ
 /// and at 2σ, so that it suits processes about as sharp as stated and blunter ones. A combination
-/// that is worse than plain voxels, with stairs and grain weighted equally, is never chosen. For
-/// the measurements see docs/evaluation.md.
+/// that is worse than plain voxels, with stairs and grain weighted equally, is never chosen. On a
+/// lattice that is coarse compared with σ, where the blur hides nothing, these are plain voxels.
+/// For the measurements see docs/evaluation.md.
+///
+/// Normals are divided into cells, and the choice for each is made when a normal first falls into
+/// it: about 2000 waves are added up at most, on any lattice. Safe to use from many threads.
 class AdaptedAmplitude {
  public:
   /// `spread_mm` is σ, the point spread of the process.
@@ -39,7 +45,10 @@ class AdaptedAmplitude {
   [[nodiscard]] FacetDither operator()(const openvdb::Vec3s& normal) const;
 
  private:
-  std::vector<FacetDither> cells_;  ///< by dominant axis and the two other slopes
+  openvdb::Vec3d pitch_mm_;
+  double spread_mm_;
+  /// By dominant axis and the two other slopes: 0 while unknown, or 1 + the number of the choice.
+  mutable std::vector<std::atomic<std::uint8_t>> cells_;
 };
 
 /// Returns the same for one facet, without the table.

@@ -50,7 +50,7 @@ Coord plainOrigin(const Coord& refined) {
 /// The inside tiles of the refined lattice, on the plain one.
 struct PlainTiles {
   std::vector<CoordBBox> whole;
-  std::vector<Coord> leaves;  ///< origins of leaves of which only one half is known to be inside
+  std::vector<Coord> leaves;  ///< origins of leaves of which only one half is an inside tile
 };
 
 PlainTiles plainTiles(const FloatTree& refined, ZRange core) {

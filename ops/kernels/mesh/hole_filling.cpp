@@ -238,9 +238,16 @@ bool Membranes::cut() {
     const auto [from, to, first] = edges[e];
     if (edges.halves(e).size() != 2 || !(is_new_[from] || is_new_[to])) continue;
     Vec3d normal(0.0);
-    for (const std::uint32_t half : edges.halves(e))
-      normal += areaOf(mesh_, mesh_.triangles[half / 3]).unitSafe();
+    double area_mm2 = 0;
+    for (const std::uint32_t half : edges.halves(e)) {
+      const Vec3d area = areaOf(mesh_, mesh_.triangles[half / 3]);
+      normal += area.unitSafe();
+      area_mm2 += area.length();
+    }
     const Vec3d side = mesh_.vertices[to] - mesh_.vertices[from];
+    // A middle moves by the length of its side at most.
+    const double least_mm = std::max(miss_mm_, 3 * minimum_mm3_ / area_mm2);
+    if (side.length() <= least_mm) continue;
     looked_at.push_back(e);
     places.push_back({mesh_.vertices[from] + 0.5 * side, normal.unitSafe(), side.length()});
   }

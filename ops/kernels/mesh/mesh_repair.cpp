@@ -13,6 +13,7 @@
 #include <tuple>
 #include <utility>
 
+#include "ops/kernels/mesh/enclosure.h"
 #include "ops/kernels/mesh/hole_filling.h"
 #include "ops/kernels/mesh/mesh_edges.h"
 #include "ops/kernels/mesh/mesh_measures.h"
@@ -282,10 +283,17 @@ std::vector<HoleLoop> holesOf(const Mesh& mesh, MeshRepairs& repairs) {
 void closeHoles(Mesh& mesh, MeshRepairs& repairs) {
   const std::vector<HoleLoop> loops = holesOf(mesh, repairs);
   const std::size_t given = mesh.triangles.size();
-  if (repairs.areOfLooseTriangles(given)) {
-    fillWithFans(mesh, loops);
-  } else {
+  // The time for better fillings is lost on a surface that bounds nothing.
+  bool bounds_volume = !repairs.areOfLooseTriangles(given);
+  if (bounds_volume && !loops.empty()) {
+    Mesh fanned = mesh;
+    fillWithFans(fanned, loops);
+    bounds_volume = enclosureOf(fanned, fanned.triangles.size() - given).boundsVolume();
+  }
+  if (bounds_volume) {
     fillWhereNumberIsHalf(mesh, loops);
+  } else {
+    fillWithFans(mesh, loops);
   }
   repairs.closed_holes += loops.size();
   repairs.filling_triangles = mesh.triangles.size() - given;

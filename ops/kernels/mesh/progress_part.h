@@ -6,6 +6,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "vdbdither/model/interrupt.h"
+
 namespace vdbdither {
 
 /// Reports the progress of a part of the work as fractions of the whole.
@@ -31,13 +33,22 @@ class ProgressPart {
   double from_ = 0, to_ = 1;
 };
 
-/// Calls work(i) for i below `count` on all threads, reporting progress between batches.
+/// Calls work(i) for i below `count` on all threads. Throws Interrupted.
+template <class Work>
+void forAll(std::size_t count, const Work& work) {
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    throwIfInterrupted();
+    work(i);
+  });
+}
+
+/// The same, reporting progress between batches.
 template <class Work>
 void forAll(std::size_t count, const ProgressPart& progress, const Work& work) {
   constexpr std::size_t batch = 1 << 16;
   for (std::size_t begin = 0; begin < count; begin += batch) {
     progress(static_cast<double>(begin) / static_cast<double>(count));
-    tbb::parallel_for(begin, std::min(count, begin + batch), work);
+    forAll(std::min(count - begin, batch), [&](std::size_t i) { work(begin + i); });
   }
 }
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "ops/kernels/mesh/enclosure.h"
 #include "ops/kernels/mesh/winding_surface.h"
 #include "vdbdither/model/errors.h"
 
@@ -50,6 +51,12 @@ SolidMesh closed(DerivedMesh triangles, const SolidOptions& options) {
         {.open_sides = repairs.boundary_edges, .sides = 3 * (count - repairs.filling_triangles)},
         options);
   }
+  if (options.guess) {
+    const Enclosure enclosure = enclosureOf(solid.mesh, repairs.filling_triangles);
+    if (!enclosure.boundsVolume())
+      throw DataError("the triangles bound no volume: " + enclosure.text(repairs.closed_holes) +
+                      "; close the surface or give it a thickness in a mesh editor first");
+  }
   solid.report.repairs = repairs;
   return solid;
 }
@@ -85,7 +92,13 @@ SolidBodies solidBodies(std::vector<Mesh> bodies, const SolidOptions& options) {
   for (Mesh& body : bodies) {
     DerivedMesh triangles = derived(std::move(body), first);
     first += static_cast<std::uint32_t>(triangles.source.size());
-    SolidMesh& solid = made.bodies.emplace_back(closed(triangles, options));
+    SolidMesh& solid = made.bodies.emplace_back();
+    try {
+      solid = closed(triangles, options);
+    } catch (const DataError& error) {
+      throw DataError("mesh " + std::to_string(made.bodies.size()) + " of " +
+                      std::to_string(bodies.size()) + ": " + error.what());
+    }
     if (solid.report.is_guess) {
       guesses.push_back({solid.mesh, solid.source});
       report.repairs.degenerate_triangles += solid.report.repairs.degenerate_triangles;

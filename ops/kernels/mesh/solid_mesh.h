@@ -53,8 +53,8 @@ struct SolidMesh : DerivedMesh {
 };
 
 struct SolidOptions {
-  /// Replaces loose triangles by a guess at the solid that they hint at. Otherwise their borders
-  /// are filled like those of other meshes.
+  /// Replaces loose triangles by a guess at the solid that they hint at, and refuses triangles that
+  /// bound no volume. Otherwise the borders of both are filled like those of other meshes.
   bool guess = true;
   bool find_walls = true;
   /// Called before a guess is made, which takes long; throws to refuse it.
@@ -63,7 +63,8 @@ struct SolidOptions {
 };
 
 /// Makes any triangles, in mm, bound a solid: by repair, or where they enclose nothing by a guess.
-/// Throws DataError where a guess finds no solid. The mesh is empty where all triangles are
+/// Throws DataError where a guess finds no solid, or where the fillings of holes bound the solid
+/// rather than the triangles; see Enclosure. The mesh is empty where all triangles are
 /// degenerate or cancel. Deterministic.
 SolidMesh solidMesh(Mesh triangles, const SolidOptions& options = {});
 

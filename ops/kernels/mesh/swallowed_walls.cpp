@@ -1,6 +1,6 @@
 // A wall is surface where the winding number is zero on one of its sides alone. Away from where
 // triangles intersect that does not change, so that a look at one triangle tells of all that hang
-// together; triangles that others pass through are cut along their planes first.
+// together; triangles that others pass through are cut where these pass.
 
 #include "ops/kernels/mesh/swallowed_walls.h"
 
@@ -9,13 +9,15 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <utility>
 
-#include <openvdb/math/BBox.h>
-#include <tbb/parallel_for.h>
-
+#include "ops/kernels/mesh/box_tree.h"
+#include "ops/kernels/mesh/line_winding.h"
 #include "ops/kernels/mesh/mesh_edges.h"
-#include "ops/kernels/mesh/winding_number.h"
+#include "ops/kernels/mesh/progress_part.h"
+#include "ops/kernels/mesh/triangle_groups.h"
+#include "ops/kernels/mesh/wall_cutter.h"
 
 namespace vdbdither {
 
@@ -23,183 +25,132 @@ using openvdb::Vec3d;
 
 namespace {
 
-using Box = openvdb::math::BBox<Vec3d>;
-using Pair = std::pair<std::uint32_t, std::uint32_t>;
-
-/// Nearer than this a corner counts as in a plane: far above rounding, far below a voxel.
-constexpr double in_plane_mm = 1e-7;
-/// How far from a wall its sides are looked at.
-constexpr double beside_mm = 1e-5;
-constexpr std::uint32_t triangles_per_leaf = 6;
-
-/// Pairs of triangles whose boxes overlap.
-class BoxTree {
- public:
-  explicit BoxTree(std::vector<Box> boxes) : boxes_(std::move(boxes)), order_(boxes_.size()) {
-    std::iota(order_.begin(), order_.end(), 0U);
-    nodes_.reserve(boxes_.size());
-    if (!boxes_.empty()) build(0, static_cast<std::uint32_t>(boxes_.size()));
-  }
-
-  template <class Visit>
-  void visitPairs(const Visit& visit) const {
-    if (!nodes_.empty()) within(0, visit);
-  }
-
- private:
-  struct Node {
-    Box box;
-    std::uint32_t begin, end, second;
-  };
-
-  std::uint32_t build(std::uint32_t begin, std::uint32_t end) {
-    const auto index = static_cast<std::uint32_t>(nodes_.size());
-    nodes_.push_back({{}, begin, end, 0});
-    Box middles;
-    for (std::uint32_t i = begin; i < end; ++i) {
-      nodes_[index].box.expand(boxes_[order_[i]]);
-      middles.expand(boxes_[order_[i]].getCenter());
-    }
-    if (end - begin <= triangles_per_leaf) return index;
-    const auto axis = static_cast<int>(middles.maxExtent());
-    const std::uint32_t half = begin + (end - begin) / 2;
-    const auto key = [&](std::uint32_t i) { return boxes_[i].min()[axis] + boxes_[i].max()[axis]; };
-    std::nth_element(order_.begin() + begin, order_.begin() + half, order_.begin() + end,
-                     [&](std::uint32_t a, std::uint32_t b) {
-                       return std::pair(key(a), a) < std::pair(key(b), b);
-                     });
-    build(begin, half);
-    const std::uint32_t second = build(half, end);
-    nodes_[index].second = second;
-    return index;
-  }
-
-  template <class Visit>
-  void within(std::uint32_t node, const Visit& visit) const {
-    const Node& own = nodes_[node];
-    if (own.second != 0) {
-      within(node + 1, visit);
-      within(own.second, visit);
-      between(node + 1, own.second, visit);
-      return;
-    }
-    for (std::uint32_t i = own.begin; i < own.end; ++i)
-      for (std::uint32_t j = i + 1; j < own.end; ++j) meet(order_[i], order_[j], visit);
-  }
-  template <class Visit>
-  void between(std::uint32_t a, std::uint32_t b, const Visit& visit) const {
-    const Node& one = nodes_[a];
-    const Node& two = nodes_[b];
-    if (!one.box.hasOverlap(two.box)) return;
-    if (one.second == 0 && two.second == 0) {
-      for (std::uint32_t i = one.begin; i < one.end; ++i)
-        for (std::uint32_t j = two.begin; j < two.end; ++j) meet(order_[i], order_[j], visit);
-    } else if (two.second == 0 || (one.second != 0 && one.end - one.begin > two.end - two.begin)) {
-      between(a + 1, b, visit);
-      between(one.second, b, visit);
-    } else {
-      between(a, b + 1, visit);
-      between(a, two.second, visit);
-    }
-  }
-  template <class Visit>
-  void meet(std::uint32_t a, std::uint32_t b, const Visit& visit) const {
-    if (boxes_[a].hasOverlap(boxes_[b])) visit(a, b);
-  }
-
-  std::vector<Box> boxes_;
-  std::vector<std::uint32_t> order_;
-  std::vector<Node> nodes_;
-};
-
-struct Plane {
-  Vec3d normal;  ///< unit
-  double offset;
-
-  [[nodiscard]] double at(const Vec3d& p) const { return normal.dot(p) - offset; }
-};
-
-using Polygon = std::vector<Vec3d>;
-
-/// Triangles that hang together, each group known by its lowest.
-class Groups {
- public:
-  explicit Groups(std::uint32_t triangles) : lower_(triangles) {
-    std::iota(lower_.begin(), lower_.end(), 0U);
-  }
-
-  /// Joins those that meet, two alone, at an edge, unless `parted` tells one of them from the rest.
-  template <class Parted>
-  void join(const MeshEdges& edges, const Parted& parted) {
-    for (std::uint32_t e = 0; e < edges.size(); ++e) {
-      const auto halves = edges.halves(e);
-      if (halves.size() != 2 || parted(halves[0] / 3) || parted(halves[1] / 3)) continue;
-      const std::uint32_t a = of(halves[0] / 3);
-      const std::uint32_t b = of(halves[1] / 3);
-      lower_[std::max(a, b)] = std::min(a, b);
-    }
-  }
-
-  [[nodiscard]] std::uint32_t of(std::uint32_t triangle) {
-    while (lower_[triangle] != triangle) triangle = lower_[triangle] = lower_[lower_[triangle]];
-    return triangle;
-  }
-
- private:
-  std::vector<std::uint32_t> lower_;
-};
-
 class Walls {
  public:
-  explicit Walls(const Mesh& mesh) : mesh_(mesh), edges_(mesh) {}
+  explicit Walls(const Mesh& mesh);
 
   SwallowedWalls find();
 
  private:
+  struct Left {
+    std::uint32_t triangle;
+    WallCutter::Surface surface = WallCutter::Surface::all;
+    std::vector<WallPiece> pieces{};
+  };
+
   [[nodiscard]] const Vec3d& corner(std::uint32_t triangle, std::size_t corner) const {
     return mesh_.vertices[mesh_.triangles[triangle][corner]];
   }
-  [[nodiscard]] Plane planeOf(std::uint32_t triangle) const {
+  [[nodiscard]] WallPiece wholeOf(std::uint32_t triangle) const {
+    return {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2)};
+  }
+  [[nodiscard]] WallPlane planeOf(std::uint32_t triangle) const {
     const Vec3d& a = corner(triangle, 0);
     Vec3d normal = (corner(triangle, 1) - a).cross(corner(triangle, 2) - a);
     const double length = normal.length();
     if (length > 0) normal /= length;
     return {normal, normal.dot(a)};
   }
-  [[nodiscard]] std::vector<Pair> intersections() const;
+  [[nodiscard]] TriangleGroups findPatches() const;
+  /// Calls visit(other) for each triangle that may intersect one, until it returns false.
+  template <class Visit>
+  bool visitIntersecting(std::uint32_t triangle, const Visit& visit) const;
   [[nodiscard]] bool mayIntersect(std::uint32_t a, std::uint32_t b) const;
-  [[nodiscard]] bool isSurface(const WindingNumber& winding, const Vec3d& p,
-                               const Vec3d& normal) const;
-  void cut(std::uint32_t triangle, const Pair* first, const Pair* last,
-           std::vector<Polygon>& pieces) const;
+  [[nodiscard]] bool passes(std::uint32_t triangle, const Vec3d& from, const Vec3d& to) const;
+  /// Whether triangles lie in one plane as far as their direction tells.
+  [[nodiscard]] bool isParallel(std::uint32_t a, std::uint32_t b) const {
+    return planes_[a].normal.cross(planes_[b].normal).length() <= 1e-6;
+  }
+  void addCuts(std::uint32_t triangle, std::uint32_t by, std::vector<WallCut>& cuts) const;
+  [[nodiscard]] std::vector<char> findCrossed() const;
+  [[nodiscard]] std::vector<std::uint32_t> largestOfPatches(TriangleGroups& patches) const;
+  [[nodiscard]] std::vector<Left> cutCrossed(const LineWinding& winding) const;
 
   const Mesh& mesh_;
   MeshEdges edges_;
-  std::vector<std::uint32_t> shell_;  ///< by triangle
-  std::vector<Plane> planes_;
-  std::vector<Box> boxes_;
+  std::uint32_t count_;
+  std::vector<WallPlane> planes_;
+  std::vector<BoxTree::Box> boxes_;
+  BoxTree tree_;
+  std::vector<char> crossed_;  ///< by triangle
 };
 
+Walls::Walls(const Mesh& mesh)
+    : mesh_(mesh),
+      edges_(mesh),
+      count_(static_cast<std::uint32_t>(mesh.triangles.size())),
+      planes_(count_),
+      boxes_(count_),
+      crossed_(count_, 0) {
+  for (std::uint32_t t = 0; t < count_; ++t) {
+    planes_[t] = planeOf(t);
+    for (std::size_t c = 0; c < 3; ++c) boxes_[t].expand(corner(t, c));
+    boxes_[t].expand(in_plane_mm);  // flat ones in one plane overlap
+  }
+  std::vector<std::uint32_t> all(count_);
+  std::iota(all.begin(), all.end(), 0U);
+  tree_ = BoxTree(boxes_, std::move(all));
+}
+
+/// Joins the triangles that meet, two alone, at an edge, unless one of them is crossed.
+TriangleGroups Walls::findPatches() const {
+  TriangleGroups patches(count_);
+  for (std::uint32_t e = 0; e < edges_.size(); ++e) {
+    const auto halves = edges_.halves(e);
+    if (halves.size() == 2 && crossed_[halves[0] / 3] == 0 && crossed_[halves[1] / 3] == 0)
+      patches.join(halves[0] / 3, halves[1] / 3);
+  }
+  return patches;
+}
+
+template <class Visit>
+bool Walls::visitIntersecting(std::uint32_t triangle, const Visit& visit) const {
+  const BoxTree::Box& own = boxes_[triangle];
+  return tree_.visit([&](const BoxTree::Box& box) { return own.hasOverlap(box); },
+                     [&](std::uint32_t other) {
+                       return other == triangle ||
+                              !mayIntersect(std::min(triangle, other), std::max(triangle, other)) ||
+                              visit(other);
+                     });
+}
+
+/// Whether a segment in the plane of a triangle passes through it, not along a side.
+bool Walls::passes(std::uint32_t triangle, const Vec3d& from, const Vec3d& to) const {
+  double first = 0;
+  double last = 1;
+  for (std::size_t side = 0; side < 3; ++side) {
+    const Vec3d& a = corner(triangle, side);
+    Vec3d inwards = planes_[triangle].normal.cross(corner(triangle, (side + 1) % 3) - a);
+    inwards.normalize();
+    const double at_from = inwards.dot(from - a);
+    const double at_to = inwards.dot(to - a);
+    if (std::max(at_from, at_to) <= in_plane_mm) return false;
+    if (at_from < 0) first = std::max(first, at_from / (at_from - at_to));
+    if (at_to < 0) last = std::min(last, at_from / (at_from - at_to));
+  }
+  return (last - first) * (to - from).length() > in_plane_mm;
+}
+
 /// False where a plane parts them: one of theirs, one along a side of each, or in one plane one
-/// through a side; touching is not meeting. Of triangles of one shell that share a vertex nothing
-/// else is expected.
+/// through a side. Touching is not meeting, unless a side lies in the plane of the other triangle
+/// and passes through it: the neighbour at that side may go on beyond the plane.
 bool Walls::mayIntersect(std::uint32_t a, std::uint32_t b) const {
-  bool joined = false;
-  for (const std::uint32_t v : mesh_.triangles[a])
-    for (const std::uint32_t w : mesh_.triangles[b]) joined |= v == w;
-  if (joined && shell_[a] == shell_[b]) return false;
   bool one_plane = true;
-  for (const auto& [by, other] : {Pair(a, b), Pair(b, a)}) {
+  for (const auto& [by, other] : {std::pair(a, b), std::pair(b, a)}) {
     if (planes_[by].normal == Vec3d(0, 0, 0)) return false;
     int above = 0;
     int below = 0;
+    std::array<Vec3d, 3> in;
+    std::size_t in_plane = 0;
     for (std::size_t c = 0; c < 3; ++c) {
       const double height = planes_[by].at(corner(other, c));
       above += height > in_plane_mm;
       below += height < -in_plane_mm;
+      if (std::abs(height) <= in_plane_mm) in[in_plane++] = corner(other, c);
     }
-    if (above == 3 || below == 3) return false;
-    one_plane &= above + below == 0;
+    if (in_plane == 3) continue;
+    one_plane = false;
+    if (above == 0 || below == 0) return in_plane == 2 && passes(by, in[0], in[1]);
   }
   const auto parts = [&](const Vec3d& axis) {
     const double length = axis.length();
@@ -223,166 +174,126 @@ bool Walls::mayIntersect(std::uint32_t a, std::uint32_t b) const {
   return true;
 }
 
-/// Every pair both ways, sorted.
-std::vector<Pair> Walls::intersections() const {
-  std::vector<Pair> pairs;
-  BoxTree(boxes_).visitPairs([&](std::uint32_t a, std::uint32_t b) {
-    if (!mayIntersect(a, b)) return;
-    pairs.emplace_back(a, b);
-    pairs.emplace_back(b, a);
-  });
-  std::sort(pairs.begin(), pairs.end());
-  return pairs;
-}
-
-bool Walls::isSurface(const WindingNumber& winding, const Vec3d& p, const Vec3d& normal) const {
-  const bool inside = std::abs(winding.at(p - normal * beside_mm)) > 0.5;
-  const bool outside = std::abs(winding.at(p + normal * beside_mm)) > 0.5;
-  return inside != outside;
-}
-
-/// Parts polygons by a plane.
-void part(std::vector<Polygon>& polygons, const Plane& plane, const Box& near) {
-  std::vector<Polygon> parted;
-  for (const Polygon& polygon : polygons) {
-    Box box;
-    bool above = false;
-    bool below = false;
-    for (const Vec3d& p : polygon) {
-      box.expand(p);
-      above |= plane.at(p) > in_plane_mm;
-      below |= plane.at(p) < -in_plane_mm;
-    }
-    if (!above || !below || !box.hasOverlap(near)) {
-      parted.push_back(polygon);
-      continue;
-    }
-    std::array<Polygon, 2> halves;
-    for (std::size_t i = 0; i < polygon.size(); ++i) {
-      const Vec3d& p = polygon[i];
-      const Vec3d& q = polygon[(i + 1) % polygon.size()];
-      const double at_p = plane.at(p);
-      const double at_q = plane.at(q);
-      if (at_p >= 0) halves[0].push_back(p);
-      if (at_p <= 0) halves[1].push_back(p);
-      if ((at_p > 0 && at_q < 0) || (at_p < 0 && at_q > 0)) {
-        const Vec3d between = p + (q - p) * (at_p / (at_p - at_q));
-        halves[0].push_back(between);
-        halves[1].push_back(between);
-      }
-    }
-    for (Polygon& half : halves)
-      if (half.size() > 2) parted.push_back(std::move(half));
+/// Adds the segments on which a triangle meets another: a stretch through it, or sides in its
+/// plane.
+void Walls::addCuts(std::uint32_t triangle, std::uint32_t by, std::vector<WallCut>& cuts) const {
+  const WallPlane& own = planes_[triangle];
+  std::array<double, 3> height;
+  std::array<bool, 3> is_in;
+  double sum = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    height[c] = own.at(corner(by, c));
+    is_in[c] = std::abs(height[c]) <= in_plane_mm;
+    sum += height[c];
   }
-  polygons = std::move(parted);
-}
-
-/// The pieces of a triangle between the planes of the triangles [first, last) that cut it.
-void Walls::cut(std::uint32_t triangle, const Pair* first, const Pair* last,
-                std::vector<Polygon>& pieces) const {
-  pieces.assign(1, {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2)});
-  for (const Pair* pair = first; pair != last; ++pair) {
-    const std::uint32_t other = pair->second;
-    Box near = boxes_[other];
-    near.expand(in_plane_mm);
-    const Plane& plane = planes_[other];
-    if (planes_[triangle].normal.cross(plane.normal).length() > 1e-6) {
-      part(pieces, plane, near);
-      continue;
-    }
-    for (std::size_t side = 0; side < 3; ++side) {  // in one plane
-      const Vec3d& a = corner(other, side);
-      Vec3d across = plane.normal.cross(corner(other, (side + 1) % 3) - a);
+  const bool is_flat = isParallel(triangle, by) || (is_in[0] && is_in[1] && is_in[2]);
+  std::array<Vec3d, 3> ends;
+  std::size_t count = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::size_t next = (c + 1) % 3;
+    const Vec3d& a = corner(by, c);
+    const Vec3d& b = corner(by, next);
+    if (is_flat) {
+      Vec3d across = own.normal.cross(b - a);
       across.normalize();
-      part(pieces, {across, across.dot(a)}, near);
+      cuts.push_back({a, b, {across, across.dot(a)}});
+    } else if (is_in[c] && is_in[next]) {
+      cuts.push_back({a, b, planes_[by], sum > 0, sum < 0});
+    } else if (is_in[c]) {
+      ends[count++] = a;
+    } else if (!is_in[next] && (height[c] > 0) != (height[next] > 0)) {
+      ends[count++] = a + (b - a) * (height[c] / (height[c] - height[next]));
     }
   }
+  if (count == 2) cuts.push_back({ends[0], ends[1], planes_[by], true, true});
+}
+
+/// Returns by triangle whether another may intersect it.
+std::vector<char> Walls::findCrossed() const {
+  std::vector<char> crossed(count_);
+  forAll(count_, [&](std::size_t i) {
+    const auto t = static_cast<std::uint32_t>(i);
+    crossed[t] = visitIntersecting(t, [](std::uint32_t) { return false; }) ? 0 : 1;
+  });
+  return crossed;
+}
+
+/// Returns the largest triangle of each patch: of what hangs together without being crossed.
+std::vector<std::uint32_t> Walls::largestOfPatches(TriangleGroups& patches) const {
+  constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> largest;
+  std::vector<std::uint32_t> place(count_, none);
+  std::vector<double> area;
+  for (std::uint32_t t = 0; t < count_; ++t) {
+    if (crossed_[t] != 0) continue;
+    const double own = (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).length();
+    std::uint32_t& at = place[patches.of(t)];
+    if (at == none) {
+      at = static_cast<std::uint32_t>(largest.size());
+      largest.push_back(t);
+      area.push_back(own);
+    } else if (own > area[at]) {
+      largest[at] = t;
+      area[at] = own;
+    }
+  }
+  return largest;
+}
+
+/// Cuts all triangles that are crossed.
+std::vector<Walls::Left> Walls::cutCrossed(const LineWinding& winding) const {
+  std::vector<Left> left;
+  for (std::uint32_t t = 0; t < count_; ++t)
+    if (crossed_[t] != 0) left.push_back({t});
+  forAll(left.size(), [&](std::size_t i) {
+    const std::uint32_t t = left[i].triangle;
+    const Vec3d& normal = planes_[t].normal;
+    std::vector<WallCut> cuts;
+    bool is_opposed = false;
+    visitIntersecting(t, [&](std::uint32_t other) {
+      addCuts(t, other, cuts);
+      is_opposed |= isParallel(t, other) && normal.dot(planes_[other].normal) < 0;
+      return true;
+    });
+    left[i].surface = WallCutter(winding, normal, is_opposed).cut(wholeOf(t), cuts, left[i].pieces);
+  });
+  return left;
 }
 
 SwallowedWalls Walls::find() {
-  const auto count = static_cast<std::uint32_t>(mesh_.triangles.size());
-  planes_.resize(count);
-  boxes_.resize(count);
-  for (std::uint32_t t = 0; t < count; ++t) {
-    planes_[t] = planeOf(t);
-    for (std::size_t c = 0; c < 3; ++c) boxes_[t].expand(corner(t, c));
-    boxes_[t].expand(in_plane_mm);  // flat ones in one plane overlap
-  }
-  Groups shells(count);
-  shells.join(edges_, [](std::uint32_t) { return false; });
-  shell_.resize(count);
-  for (std::uint32_t t = 0; t < count; ++t) shell_[t] = shells.of(t);
-  const std::vector<Pair> pairs = intersections();
-  std::vector<bool> crossed(count, false);
-  for (const Pair& pair : pairs) crossed[pair.first] = true;
-
-  // What hangs together without a crossing, each with its largest triangle.
-  constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-  Groups patch(count);
-  patch.join(edges_, [&](std::uint32_t t) { return crossed[t]; });
-  std::vector<std::uint32_t> largest(count, none);
-  std::vector<double> area(count, 0);
-  std::vector<std::uint32_t> patches;
-  for (std::uint32_t t = 0; t < count; ++t) {
-    if (crossed[t]) continue;
-    const double own = (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).length();
-    const std::uint32_t of = patch.of(t);
-    if (of == t) patches.push_back(t);
-    if (largest[of] == none || own > area[of]) {
-      largest[of] = t;
-      area[of] = own;
-    }
-  }
   SwallowedWalls walls;
-  if (pairs.empty() && patches.size() == 1) return walls;
+  crossed_ = findCrossed();
+  TriangleGroups patches = findPatches();
+  const std::vector<std::uint32_t> largest = largestOfPatches(patches);
+  const bool none_crossed = std::find(crossed_.begin(), crossed_.end(), 1) == crossed_.end();
+  if (none_crossed && largest.size() < 2) return walls;
 
-  const WindingNumber winding(mesh_);
-  const auto middleOf = [](const Polygon& polygon) {
-    return std::accumulate(polygon.begin(), polygon.end(), Vec3d(0, 0, 0)) /
-           static_cast<double>(polygon.size());
-  };
-  std::vector<char> surface(count, 1);  // of patches, by their root
-  tbb::parallel_for(std::size_t{0}, patches.size(), [&](std::size_t i) {
-    const std::uint32_t t = largest[patches[i]];
-    surface[patches[i]] =
-        isSurface(winding, middleOf({corner(t, 0), corner(t, 1), corner(t, 2)}), planes_[t].normal);
+  const LineWinding winding(mesh_, edges_, boxes_);
+  std::vector<char> surface(count_, 1);  // of patches, by their root
+  std::vector<char> is_surface(largest.size());
+  forAll(largest.size(), [&](std::size_t i) {
+    const std::uint32_t t = largest[i];
+    is_surface[i] =
+        WallCutter(winding, planes_[t].normal, true).isSurface(middleOf(wholeOf(t))) ? 1 : 0;
   });
-  struct Left {
-    std::vector<Polygon> pieces;
-    std::size_t of = 0;  ///< so many
-  };
-  std::vector<std::size_t> begins;  // of every crossed triangle's pairs
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    if (i == 0 || pairs[i].first != pairs[i - 1].first) begins.push_back(i);
-  begins.push_back(pairs.size());
-  std::vector<Left> left(begins.size() - 1);
-  tbb::parallel_for(std::size_t{0}, left.size(), [&](std::size_t i) {
-    const std::uint32_t t = pairs[begins[i]].first;
-    std::vector<Polygon>& pieces = left[i].pieces;
-    cut(t, pairs.data() + begins[i], pairs.data() + begins[i + 1], pieces);
-    left[i].of = pieces.size();
-    std::erase_if(pieces, [&](const Polygon& piece) {
-      return !isSurface(winding, middleOf(piece), planes_[t].normal);
-    });
-  });
+  for (std::size_t i = 0; i < largest.size(); ++i) surface[patches.of(largest[i])] = is_surface[i];
 
-  walls.hidden.assign(count, false);
-  for (std::uint32_t t = 0; t < count; ++t) {
-    if (crossed[t] || surface[patch.of(t)] != 0) continue;
+  walls.hidden.assign(count_, false);
+  for (std::uint32_t t = 0; t < count_; ++t) {
+    if (crossed_[t] != 0 || surface[patches.of(t)] != 0) continue;
     walls.hidden[t] = true;
     ++walls.swallowed;
   }
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    const std::uint32_t t = pairs[begins[i]].first;
-    if (left[i].pieces.size() == left[i].of) continue;
-    walls.hidden[t] = true;
-    ++(left[i].pieces.empty() ? walls.swallowed : walls.cut);
-    for (const Polygon& piece : left[i].pieces) {
+  for (const Left& left : cutCrossed(winding)) {
+    if (left.surface == WallCutter::Surface::all) continue;
+    walls.hidden[left.triangle] = true;
+    ++(left.surface == WallCutter::Surface::none ? walls.swallowed : walls.cut);
+    for (const WallPiece& piece : left.pieces) {
       const auto first = static_cast<std::uint32_t>(walls.pieces.vertices.size());
       walls.pieces.vertices.insert(walls.pieces.vertices.end(), piece.begin(), piece.end());
       for (std::uint32_t corner = 2; corner < piece.size(); ++corner) {
         walls.pieces.triangles.push_back({first, first + corner - 1, first + corner});
-        walls.piece_of.push_back(t);
+        walls.piece_of.push_back(left.triangle);
       }
     }
   }

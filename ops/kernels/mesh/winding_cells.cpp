@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include <tbb/parallel_for.h>
+#include "ops/kernels/mesh/progress_part.h"
 
 namespace vdbdither {
 
@@ -38,14 +38,14 @@ std::vector<std::uint32_t> WindingCells::at(const std::vector<Coord>& lows) {
   sortUnique(asked);
   eraseAll(asked, [this](Key key) { return corners_.contains(key); });
   std::vector<WindingCell::Corner> made(asked.size());
-  tbb::parallel_for(std::size_t{0}, asked.size(), [&](std::size_t i) {
+  forAll(asked.size(), [&](std::size_t i) {
     const Vec3d p = position(coordOf(asked[i]));
     made[i] = {winding_.closelyAt(p), winding_.gradientAt(p)};
   });
   for (std::size_t i = 0; i < asked.size(); ++i) corners_.add(asked[i], made[i]);
   const std::size_t before = cells_.size();
   cells_.resize(before + fresh.size());
-  tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
+  forAll(fresh.size(), [&](std::size_t i) {
     std::array<WindingCell::Corner, 8> corners;
     for (unsigned corner = 0; corner < 8; ++corner)
       corners[corner] = corners_.at(keyOf(cornerOf(fresh[i], corner)));

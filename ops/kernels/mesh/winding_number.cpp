@@ -18,8 +18,6 @@ using openvdb::Vec3d;
 
 namespace {
 
-constexpr std::uint32_t triangles_per_leaf = 8;
-
 /// A number nearer to ½ than this is computed again, more accurately.
 constexpr double rough_doubt = 0.01;
 constexpr double close_doubt = 0.0005;
@@ -30,14 +28,15 @@ double fromHalf(double number) { return std::abs(std::abs(number) - 0.5); }
 struct HalfAngle {
   double re, im;
 };
-HalfAngle halfAngle(const std::array<Vec3d, 3>& corners, const Vec3d& p) {
-  const Vec3d a = corners[0] - p;
-  const Vec3d b = corners[1] - p;
-  const Vec3d c = corners[2] - p;
-  const double la = a.length();
-  const double lb = b.length();
-  const double lc = c.length();
+/// Of the triangle whose corners are seen at a, b and c.
+HalfAngle halfAngle(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+  const double la = std::sqrt(a.x() * a.x() + a.y() * a.y() + a.z() * a.z());
+  const double lb = std::sqrt(b.x() * b.x() + b.y() * b.y() + b.z() * b.z());
+  const double lc = std::sqrt(c.x() * c.x() + c.y() * c.y() + c.z() * c.z());
   return {la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb, a.dot(b.cross(c))};
+}
+HalfAngle halfAngle(const std::array<Vec3d, 3>& corners, const Vec3d& p) {
+  return halfAngle(corners[0] - p, corners[1] - p, corners[2] - p);
 }
 
 /// A sum of half angles: their product, and how often its argument has passed π.
@@ -54,6 +53,12 @@ class HalfAngleSum {
     if (im_ < 0 && im < 0 && next_im >= 0) --turns_;
     re_ = next_re;
     im_ = next_im;
+  }
+  /// Prevents that the product of many grows beyond all bounds.
+  void shorten() {
+    const double size = std::max(std::abs(re_), std::abs(im_));
+    re_ /= size;
+    im_ /= size;
   }
   [[nodiscard]] double total() const {
     return std::atan2(im_, re_) + 2 * std::numbers::pi * turns_;
@@ -109,6 +114,17 @@ WindingNumber::WindingNumber(const Mesh& mesh) : mesh_(mesh), order_(mesh.triang
   if (!order_.empty()) build(0, static_cast<std::uint32_t>(order_.size()));
   middles_.clear();
   middles_.shrink_to_fit();
+  for (Node& node : nodes_) {
+    if (node.other != 0) continue;
+    node.corners = static_cast<std::uint32_t>(leaf_corners_.size());
+    LeafCorners& leaf = leaf_corners_.emplace_back();
+    for (std::uint32_t i = node.begin; i < node.end; ++i) {
+      const std::array<Vec3d, 3> at = corners(order_[i]);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        for (std::size_t corner = 0; corner < 3; ++corner)
+          leaf[3 * corner + axis][i - node.begin] = at[corner][static_cast<int>(axis)];
+    }
+  }
 }
 
 WindingNumber::Node WindingNumber::nodeOf(std::uint32_t begin, std::uint32_t end) const {
@@ -248,10 +264,25 @@ double WindingNumber::sum(const Vec3d& p, double far_radii) const {
                 (-3 * across - 1.5 * node.second_trace.dot(r) + 7.5 * per_squared * thrice)) *
            per_squared / std::sqrt(squared);
   };
-  double number = 0;
-  const auto near = [&](const Node& node) { number += windingOf(mesh_, trianglesOf(node), p); };
+  HalfAngleSum angles;
+  const auto near = [&](const Node& node) {
+    const LeafCorners& at = leaf_corners_[node.corners];
+    std::array<double, triangles_per_leaf> re;
+    std::array<double, triangles_per_leaf> im;
+    for (std::size_t i = 0; i < triangles_per_leaf; ++i) {
+      const auto to = [&](std::size_t corner) {
+        return Vec3d(at[3 * corner][i] - p.x(), at[3 * corner + 1][i] - p.y(),
+                     at[3 * corner + 2][i] - p.z());
+      };
+      const HalfAngle half = halfAngle(to(0), to(1), to(2));
+      re[i] = half.re;
+      im[i] = half.im;
+    }
+    for (std::size_t i = 0; i < node.end - node.begin; ++i) angles.add({re[i], im[i]});
+    angles.shorten();
+  };
   forEach(p, far_radii, far, near);
-  return number + sum / (4 * std::numbers::pi);
+  return angles.total() / (2 * std::numbers::pi) + sum / (4 * std::numbers::pi);
 }
 
 /// A group adds the derivative of its terms in the number.

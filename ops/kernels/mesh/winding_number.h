@@ -93,7 +93,11 @@ class WindingNumber {
     std::uint32_t begin, end;       ///< of `order_`
     std::uint32_t
         other;  ///< the node of the second half; that of the first half follows; 0 for a leaf
+    std::uint32_t corners;  ///< of a leaf, in `leaf_corners_`
   };
+  static constexpr std::uint32_t triangles_per_leaf = 8;
+  /// The corners of a leaf's triangles, by corner and axis, so that several are computed at once.
+  using LeafCorners = std::array<std::array<double, triangles_per_leaf>, 9>;
 
   [[nodiscard]] std::array<openvdb::Vec3d, 3> corners(std::uint32_t triangle) const {
     return cornersOf(mesh_, triangle);
@@ -113,6 +117,7 @@ class WindingNumber {
   std::vector<openvdb::Vec3d> middles_;  ///< of the triangles, while the tree is built
   std::vector<std::uint32_t> order_;
   std::vector<Node> nodes_;
+  std::vector<LeafCorners> leaf_corners_;
 };
 
 }  // namespace vdbdither

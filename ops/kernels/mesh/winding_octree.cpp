@@ -10,7 +10,6 @@
 #include <numeric>
 #include <utility>
 
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
 #include "ops/kernels/mesh/triangle_and_cube.h"
@@ -96,7 +95,7 @@ void WindingOctree::addTouched() {
   constexpr std::uint32_t in_a_block = 256;
   const auto count = static_cast<std::uint32_t>(mesh_.triangles.size());
   std::vector<std::vector<Touch>> blocks((count + in_a_block - 1) / in_a_block);
-  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t block) {
+  forAll(blocks.size(), [&](std::size_t block) {
     const auto begin = static_cast<std::uint32_t>(block * in_a_block);
     for (std::uint32_t t = begin; t < std::min(count, begin + in_a_block); ++t)
       addTouches(cells_, t, blocks[block]);
@@ -191,7 +190,7 @@ void WindingOctree::findCells(std::span<const std::uint32_t> fresh) {
 void WindingOctree::judgeCorners(std::span<const std::uint32_t> fresh,
                                  const ProgressPart& progress) {
   std::vector<std::pair<Key, std::uint32_t>> corners(8 * fresh.size());  // and a leaf with each
-  tbb::parallel_for(std::size_t{0}, corners.size(), [&](std::size_t i) {
+  forAll(corners.size(), [&](std::size_t i) {
     const std::uint32_t leaf = fresh[i / 8];
     corners[i] = {keyOf(cornerOf(leaves_[leaf], static_cast<int>(i % 8))), leaf};
   });
@@ -206,8 +205,8 @@ void WindingOctree::judgeCorners(std::span<const std::uint32_t> fresh,
     inside[i] = number > 0.5 ? 1 : 0;
   });
   for (std::size_t i = 0; i < corners.size(); ++i) inside_.add(corners[i].first, inside[i] != 0);
-  tbb::parallel_for(std::size_t{0}, fresh.size(),
-                    [&](std::size_t i) { leaves_[fresh[i]].inside = insideOf(leaves_[fresh[i]]); });
+  forAll(fresh.size(),
+         [&](std::size_t i) { leaves_[fresh[i]].inside = insideOf(leaves_[fresh[i]]); });
 }
 
 /// Finds the crossings of the leaves' edges that are cut or may be pierced.
@@ -234,7 +233,7 @@ void WindingOctree::findCrossings(std::span<const std::uint32_t> fresh,
 /// Adds the cells across cut edges and divides the leaves that need it. Returns the new leaves.
 std::vector<std::uint32_t> WindingOctree::spread(std::span<const std::uint32_t> fresh) {
   std::vector<char> divided(fresh.size(), 0);
-  tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
+  forAll(fresh.size(), [&](std::size_t i) {
     const Leaf& leaf = leaves_[fresh[i]];
     divided[i] = leaf.size > smallest_ && needsDivision(leaf) ? 1 : 0;
   });

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include <openvdb/math/BBox.h>
-#include <tbb/parallel_for.h>
 
 #include "ops/kernels/mesh/grid_keys.h"
 #include "ops/kernels/mesh/mesh_measures.h"
@@ -40,7 +39,7 @@ std::vector<CutEdge> cutEdgesOf(const WindingOctree& octree) {
   }
   sortUnique(keys);
   std::vector<CutEdge> cut(keys.size());
-  tbb::parallel_for(std::size_t{0}, keys.size(), [&](std::size_t i) {
+  forAll(keys.size(), [&](std::size_t i) {
     const WindingOctree::Edge edge = WindingOctree::edgeOf(keys[i]);
     cut[i].key = keys[i];
     for (int turn = 0; turn < 4; ++turn) {
@@ -75,7 +74,7 @@ DerivedMesh surfaceOf(const WindingOctree& octree) {
     }
   begins.push_back(static_cast<std::uint32_t>(of_leaf.size()));
   mesh.vertices.resize(cut.size() + begins.size() - 1);
-  tbb::parallel_for(std::size_t{0}, begins.size() - 1, [&](std::size_t i) {
+  forAll(begins.size() - 1, [&](std::size_t i) {
     std::vector<EdgeCrossing> crossings;
     for (std::uint32_t c = begins[i]; c < begins[i + 1]; ++c)
       crossings.push_back(octree.crossingAt(cut[of_leaf[c].second].key));

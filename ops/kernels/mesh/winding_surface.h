@@ -7,8 +7,9 @@
 
 namespace vdbdither {
 
-/// The surface of a solid that triangles hint at: closed, faces outwards, empty where there is no
-/// solid. The source of a triangle is one that the surface follows there; none between triangles.
+/// The surface of the solid that loose triangles suggest: closed, with faces outwards, empty if
+/// there is no solid. The source of a triangle is one that the surface follows there, if there is
+/// one.
 struct WindingSurface : DerivedMesh {
   double cell_mm = 0;   ///< the edge of the smallest cells used
   bool turned = false;  ///< the triangles face inwards: the solid is where the number is below −½

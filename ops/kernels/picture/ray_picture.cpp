@@ -7,6 +7,7 @@
 #include <cmath>
 #include <embree3/rtcore.h>
 #include <limits>
+#include <new>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -278,6 +279,7 @@ RayScene::RayScene(const Mesh& mesh) : rays_(std::make_unique<Rays>()) {
   rays_->device = rtcNewDevice(nullptr);
   const auto check = [&] {
     const RTCError error = rtcGetDeviceError(rays_->device);
+    if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
     if (error != RTC_ERROR_NONE)
       throw DataError("the mesh cannot be prepared for rays: Embree's error " +
                       std::to_string(static_cast<int>(error)));

@@ -3,7 +3,7 @@
 // each pass limited to the maximum depth of the bands and to leaf-sized blocks that hold voxels:
 // along z from the bits of the leaves, then y, then x. A pass goes outwards from each plane of a
 // block and ends when no further step can change the result: along x, when every voxel of the plane
-// is known to lie in the outermost band.
+// lies in the outermost band.
 
 #include "ops/kernels/printing/depth_bands.h"
 

@@ -1,14 +1,41 @@
 #include "io/file/staged_output.h"
 
+#include <cerrno>
+#include <csignal>
+#include <fcntl.h>
 #include <fstream>
+#include <functional>
 #include <optional>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <thread>
 #include <unistd.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "io/file/staging_name.h"
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"
+
+namespace {
+
+// A file system that cannot exchange, and a process that dies between two renames.
+bool exchanges = true;
+int renames_to_live = -1;
+
+}  // namespace
+
+extern "C" int renameat2(int from_folder, const char* from, int to_folder, const char* to,
+                         unsigned flags) noexcept {
+  if (flags != 0 && !exchanges) {
+    errno = EINVAL;
+    return -1;
+  }
+  if (renames_to_live == 0) _exit(0);
+  if (renames_to_live > 0) --renames_to_live;
+  return static_cast<int>(::syscall(SYS_renameat2, from_folder, from, to_folder, to, flags));
+}
 
 namespace vdbdither {
 namespace {
@@ -17,6 +44,7 @@ namespace fs = std::filesystem;
 using Kind = StagedOutput::Kind;
 using testing::IsEmpty;
 using testing::Pair;
+using testing::SizeIs;
 using testing::ThrowsMessage;
 using testing::UnorderedElementsAre;
 
@@ -26,6 +54,61 @@ const std::vector<std::uint8_t> two = {2, 2};
 void put(const fs::path& path, const std::vector<std::uint8_t>& bytes) {
   writeFile(path, bytes, path);
 }
+
+/// An output that wrote `old` and `white/old` before.
+std::set<std::string> ownFiles(const fs::path& /*folder*/) { return {"old", "white/old"}; }
+
+/// Runs `function` in a process of its own, which ends without cleaning up.
+void inAnotherProcess(const std::function<void()>& function) {
+  const pid_t child = fork();
+  if (child == 0) {
+    function();
+    _exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_EQ(status, 0);
+}
+
+std::vector<std::string> namesIn(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    names.push_back(entry.path().filename().string());
+  return names;
+}
+
+/// A folder `out` with the files of an earlier output.
+class OldStack : public testing::Test {
+ protected:
+  void SetUp() override {
+    fs::create_directories(scratch_ / "out/white");
+    put(scratch_ / "out/old", one);
+    put(scratch_ / "out/white/old", one);
+  }
+  void TearDown() override { exchanges = true; }
+
+  /// The refusal of overwriting it, with TMP for the scratch folder.
+  [[nodiscard]] std::string refusal(const std::string& name = "out") const {
+    try {
+      StagedOutput::checkFolder(scratch_ / name, true, ownFiles,
+                                [](const std::string& text) { FAIL() << text; });
+    } catch (const UsageError& error) {
+      std::string text = error.what();
+      for (std::size_t at; (at = text.find(scratch_.path().string())) != std::string::npos;)
+        text.replace(at, scratch_.path().string().size(), "TMP");
+      return text;
+    }
+    return "";
+  }
+
+  void replace() const {
+    StagedOutput output(scratch_ / "out", Kind::folder, ownFiles);
+    output.write("new", two);
+    output.commit();
+  }
+
+  test::ScratchFolder scratch_;
+};
 
 TEST(StagedOutput, AFolderExistsOnlyOnceCommitted) {
   const test::ScratchFolder scratch;
@@ -64,7 +147,7 @@ TEST(StagedOutput, ReplacesTheWholeOfTheOld) {
   fs::create_directory(scratch / "out");
   put(scratch / "out/old", one);
   put(scratch / "file", one);
-  StagedOutput folder(scratch / "out/", Kind::folder);
+  StagedOutput folder(scratch / "out/", Kind::folder, ownFiles);
   folder.write("new", two);
   folder.commit();
   StagedOutput file(scratch / "file", Kind::file);
@@ -77,18 +160,262 @@ TEST(StagedOutput, ReplacesTheWholeOfTheOld) {
 
 TEST(StagedOutput, RemovesWhatAKilledRunLeftButNotALivingOnes) {
   const test::ScratchFolder scratch;
+  inAnotherProcess([&] {
+    const auto* output = new StagedOutput(scratch / "out", Kind::folder);
+    output->write("half", one);
+    put(output->path().string() + "-faces", one);
+  });
+  ASSERT_THAT(namesIn(scratch.path()), SizeIs(2));
+  // Made by a process that lives, by one of another machine, by the same process for another name.
+  std::string living = stagingPath(scratch / "out").string();
+  living.replace(living.rfind('-') + 1, living.npos, std::to_string(getppid()));
+  std::string elsewhere = (scratch / ".out.partial-00000000-").string() + std::to_string(1 << 29);
+  put(living, one);
+  put(elsewhere, one);
+  put(scratch / ".out.partial-mine", one);
+  put(scratch / ".out2.partial-mine", one);
+  StagedOutput(scratch / "out", Kind::folder).commit();
+  EXPECT_THAT(
+      namesIn(scratch.path()),
+      UnorderedElementsAre("out", fs::path(living).filename(), fs::path(elsewhere).filename(),
+                           ".out.partial-mine", ".out2.partial-mine"));
+}
+
+TEST_F(OldStack, IsReplacedButForFilesOfOthers) {
+  EXPECT_EQ(refusal(), "");
+  replace();
+  EXPECT_THAT(test::filesUnder(scratch_.path()), UnorderedElementsAre(Pair("out/new", two)));
+  EXPECT_THAT(namesIn(scratch_ / "out"), UnorderedElementsAre("new"));
+}
+
+TEST_F(OldStack, WithFilesOfOthersIsRefused) {
+  const std::string rest =
+      ", which was not written with the rest; move it elsewhere, or name another folder";
+  put(scratch_ / "out/notes.txt", one);
+  EXPECT_EQ(refusal(), "'TMP/out' holds 'notes.txt'" + rest);
+  put(scratch_ / "out/.hidden", one);
+  EXPECT_EQ(refusal(), "'TMP/out' holds '.hidden'" + rest);
+  fs::remove(scratch_ / "out/.hidden");
+  fs::remove(scratch_ / "out/notes.txt");
+  put(scratch_ / "out/white/mine", one);
+  EXPECT_EQ(refusal(), "'TMP/out' holds 'white/mine'" + rest);
+  fs::remove(scratch_ / "out/white/mine");
+  fs::create_directory(scratch_ / "out/empty");
+  EXPECT_EQ(refusal(), "'TMP/out' holds 'empty'" + rest);
+  fs::remove(scratch_ / "out/empty");
+  fs::remove(scratch_ / "out/old");
+  fs::create_directory(scratch_ / "out/old");
+  EXPECT_EQ(refusal(), "'TMP/out' holds 'old'" + rest);
+  fs::remove(scratch_ / "out/old");
+  fs::remove_all(scratch_ / "out/white");
+  fs::create_directory(scratch_ / "elsewhere");
+  put(scratch_ / "elsewhere/old", one);
+  fs::create_directory_symlink(scratch_ / "elsewhere", scratch_ / "out/white");
+  EXPECT_EQ(refusal(), "'TMP/out' holds 'white'" + rest);
+}
+
+TEST_F(OldStack, OfWhichSomeIsMissingIsReplaced) {
+  fs::remove_all(scratch_ / "out/white");
+  EXPECT_EQ(refusal(), "");
+}
+
+TEST_F(OldStack, KeepsFilesThatOthersAddWhileTheNewOneIsWritten) {
+  for (const bool can_exchange : {true, false}) {
+    exchanges = can_exchange;
+    StagedOutput output(scratch_ / "out", Kind::folder, ownFiles);
+    output.write("new", two);
+    put(scratch_ / "out/notes.txt", one);
+    put(scratch_ / "out/new", one);
+    fs::create_directories(scratch_ / "out/mine/deep");
+    put(scratch_ / "out/mine/deep/a", one);
+    output.commit();
+    EXPECT_THAT(test::filesUnder(scratch_.path()),
+                UnorderedElementsAre(Pair("out/new", two), Pair("out/notes.txt", one),
+                                     Pair("out/mine/deep/a", one)));
+    EXPECT_THAT(namesIn(scratch_.path()), UnorderedElementsAre("out"));
+  }
+}
+
+TEST_F(OldStack, KeepsEverythingWhereItsOwnFilesBecomeUnknown) {
+  StagedOutput output(scratch_ / "out", Kind::folder,
+                      [](const fs::path&) -> std::set<std::string> { throw UsageError("?"); });
+  output.write("new", two);
+  output.commit();
+  EXPECT_THAT(
+      test::filesUnder(scratch_.path()),
+      UnorderedElementsAre(Pair("out/new", two), Pair("out/old", one), Pair("out/white/old", one)));
+}
+
+TEST_F(OldStack, IsReplacedWithoutAnExchange) {
+  exchanges = false;
+  replace();
+  EXPECT_THAT(test::filesUnder(scratch_.path()), UnorderedElementsAre(Pair("out/new", two)));
+  EXPECT_THAT(namesIn(scratch_.path()), UnorderedElementsAre("out"));
+}
+
+TEST_F(OldStack, IsPutBackAfterARunThatWasKilledBetweenTwoRenames) {
+  const auto before = test::filesUnder(scratch_.path());
+  inAnotherProcess([&] {
+    exchanges = false;
+    renames_to_live = 1;
+    replace();
+  });
+  ASSERT_FALSE(fs::exists(scratch_ / "out"));
+  std::vector<std::string> warnings;
+  const auto warn = [&](const std::string& text) { warnings.push_back(text); };
+  EXPECT_THAT([&] { StagedOutput::checkFolder(scratch_ / "out", false, ownFiles, warn); },
+              ThrowsMessage<UsageError>(testing::HasSubstr("exists; --overwrite replaces it")));
+  EXPECT_THAT(warnings,
+              testing::ElementsAre("'" + (scratch_ / "out").string() +
+                                   "' was being replaced when a run was killed; the folder before "
+                                   "it is put back"));
+  EXPECT_EQ(test::filesUnder(scratch_ / "out").size(), before.size());
+  EXPECT_EQ(refusal(), "");
+  replace();
+  EXPECT_THAT(test::filesUnder(scratch_.path()), UnorderedElementsAre(Pair("out/new", two)));
+  EXPECT_THAT(namesIn(scratch_.path()), UnorderedElementsAre("out"));
+}
+
+TEST_F(OldStack, SurvivesARunThatIsKilledBeforeOrAfterTheRenames) {
+  for (const int renames : {0, 2}) {
+    const auto before = test::filesUnder(scratch_ / "out");
+    inAnotherProcess([&] {
+      exchanges = false;
+      renames_to_live = renames;
+      replace();
+      renames_to_live = 0;
+    });
+    EXPECT_EQ(test::filesUnder(scratch_ / "out") == before, renames == 0);
+  }
+}
+
+TEST(StagedOutput, ALinkStaysAndWhatItLeadsToIsReplaced) {
+  const test::ScratchFolder scratch;
+  fs::create_directories(scratch / "deep/real");
+  put(scratch / "deep/real/old", one);
+  put(scratch / "deep/file", one);
+  fs::create_symlink("deep/real/", scratch / "folder");
+  fs::create_symlink("deep/link", scratch / "file");
+  fs::create_symlink("file", scratch / "deep/link");
+  fs::create_symlink("deep/new", scratch / "dangling");
+  for (const char* name : {"folder", "dangling"}) {
+    StagedOutput::check(scratch / name, Kind::folder, true);
+    StagedOutput output(scratch / name, Kind::folder, ownFiles);
+    output.write("new", two);
+    output.commit();
+  }
+  StagedOutput::check(scratch / "file", Kind::file, true);
+  StagedOutput output(scratch / "file", Kind::file);
+  EXPECT_EQ(output.path().parent_path(), scratch / "deep");
+  put(output.path(), two);
+  output.commit();
+  for (const char* name : {"folder", "file", "dangling", "deep/link"})
+    EXPECT_TRUE(fs::is_symlink(scratch / name)) << name;
+  EXPECT_THAT(test::filesUnder(scratch.path()),
+              UnorderedElementsAre(Pair("deep/real/new", two), Pair("deep/file", two),
+                                   Pair("deep/new/new", two)));
+}
+
+TEST(StagedOutput, ALinkThatLeadsNowhereIsRefused) {
+  const test::ScratchFolder scratch;
+  fs::create_symlink("loop", scratch / "loop");
+  fs::create_symlink("no/such", scratch / "lost");
+  EXPECT_THAT([&] { StagedOutput::check(scratch / "loop", Kind::file, true); },
+              ThrowsMessage<UsageError>("cannot write to '" + (scratch / "loop").string() +
+                                        "': the link leads nowhere"));
+  EXPECT_THAT(
+      [&] { StagedOutput::check(scratch / "lost", Kind::file, true); },
+      ThrowsMessage<UsageError>("cannot write to '" + (scratch / "lost").string() +
+                                "': there is no folder '" + (scratch / "no").string() + "'"));
+}
+
+TEST(StagedOutput, TheParentBehindALinkIsThatOfItsTarget) {
+  const test::ScratchFolder scratch;
+  fs::create_directories(scratch / "far/away");
+  fs::create_directory_symlink("far/away", scratch / "link");
+  StagedOutput output(scratch / "link/../out", Kind::folder);
+  output.write("new", two);
+  output.commit();
+  EXPECT_THAT(test::filesUnder(scratch.path()), UnorderedElementsAre(Pair("far/out/new", two)));
+}
+
+TEST(StagedOutput, NamesMayBeAsLongAsTheFileSystemAllows) {
+  const test::ScratchFolder scratch;
+  std::string umlauts;
+  for (int i = 0; i < 127; ++i) umlauts += "ä";
+  const std::string letters(255, 'a');
+  for (const std::string& name : {letters, umlauts}) {
+    StagedOutput::check(scratch / name, Kind::file, false);
+    StagedOutput file(scratch / name, Kind::file);
+    EXPECT_LT(file.path().filename().string().size(), 100U);
+    put(file.path(), one);
+    file.commit();
+  }
+  const std::string other = std::string(254, 'a') + "b";
+  EXPECT_NE(stagingPath(scratch / letters), stagingPath(scratch / other));
+  StagedOutput folder(scratch / other, Kind::folder);
+  folder.write(letters + "/" + letters, two);
+  folder.commit();
+  EXPECT_THAT(test::filesUnder(scratch.path()),
+              UnorderedElementsAre(Pair(letters, one), Pair(umlauts, one),
+                                   Pair(other + "/" + letters + "/" + letters, two)));
+  EXPECT_THAT([&] { StagedOutput::check(scratch / (letters + "a"), Kind::file, false); },
+              ThrowsMessage<UsageError>(testing::HasSubstr(": a name has at most 255 bytes")));
+}
+
+TEST(StagedOutput, WritesBelowItsFolderOnlyAndEachFileOnce) {
+  const test::ScratchFolder scratch;
+  const StagedOutput output(scratch / "out", Kind::folder);
+  const std::string shown = "cannot write '" + (scratch / "out").string();
+  const auto writing = [&](const std::string& name) {
+    return [&, name] { output.write(name, one); };
+  };
+  EXPECT_THAT(writing("../x"),
+              ThrowsMessage<DataError>(shown + "/../x': the name has a folder whose name is '..'"));
+  EXPECT_THAT(writing((scratch / "x").string()),
+              ThrowsMessage<DataError>(testing::HasSubstr("the name is an absolute path")));
+  EXPECT_THAT(writing(".."), ThrowsMessage<DataError>(shown + "/..': the name is '..'"));
+  output.write("a/b", one);
+  EXPECT_THAT(writing("a/b"), ThrowsMessage<DataError>(shown + "/a/b': File exists"));
+  fs::create_symlink(scratch / "victim", output.path() / "link");
+  EXPECT_THAT(writing("link"), ThrowsMessage<DataError>(shown + "/link': File exists"));
+  EXPECT_EQ(namesIn(scratch.path()).size(), 1U);
+}
+
+TEST(StagedOutput, RemovesWhatBelongsToAPartialOutputOfAKilledRun) {
+  const test::ScratchFolder scratch;
   const pid_t dead = fork();
   if (dead == 0) _exit(0);
   int status = 0;
   waitpid(dead, &status, 0);
-  fs::create_directory(scratch / (".out.partial-" + std::to_string(dead)));
-  put(scratch / (".out.partial-" + std::to_string(dead)) / "half", one);
-  put(scratch / (".out.partial-" + std::to_string(getppid())), one);
-  put(scratch / ".out.partial-mine", one);
-  StagedOutput(scratch / "out", Kind::folder).commit();
-  EXPECT_THAT(test::filesUnder(scratch.path()),
-              UnorderedElementsAre(Pair(".out.partial-" + std::to_string(getppid()), one),
-                                   Pair(".out.partial-mine", one)));
+  for (const std::string name : {"", ".old", "-faces"})
+    put(scratch / (".out.partial-" + std::to_string(dead) + name), one);
+  StagedOutput(scratch / "out", Kind::file);
+  EXPECT_THAT(test::filesUnder(scratch.path()), IsEmpty());
+}
+
+TEST(StagedOutput, AfterAbandonAllNothingRemainsAndNothingIsCommitted) {
+  const test::ScratchFolder scratch;
+  put(scratch / "old", one);
+  // A process of its own, for no output can be committed in it afterwards.
+  const pid_t child = fork();
+  if (child == 0) {
+    StagedOutput folder(scratch / "out", Kind::folder);
+    folder.write("deep/er/a", one);
+    StagedOutput file(scratch / "old", Kind::file);
+    put(file.path(), two);
+    StagedOutput unwritten(scratch / "new", Kind::file);
+    StagedOutput::abandonAll(std::chrono::milliseconds(100));
+    std::thread([&] { folder.write("deep/er/b", one); }).detach();
+    std::thread([&] { file.commit(); }).detach();
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  EXPECT_THAT(test::filesUnder(scratch.path()), UnorderedElementsAre(Pair("old", one)));
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), {}), 1);
 }
 
 TEST(StagedOutput, RefusesBeforeAnyWork) {
@@ -126,8 +453,36 @@ TEST(StagedOutput, RefusesBeforeAnyWork) {
                 ThrowsMessage<UsageError>("cannot write to '" + name +
                                           "': give a folder or file a name of its own"));
   }
+  EXPECT_THAT([] { StagedOutput::check("/proc", Kind::folder, true); },
+              ThrowsMessage<UsageError>(
+                  "'/proc' is a mount point, which cannot be replaced; name something in it"));
+  const fs::path here = fs::current_path();
+  fs::current_path(scratch / "empty");
+  EXPECT_THAT([] { StagedOutput::check("../empty", Kind::folder, true); },
+              ThrowsMessage<UsageError>("'../empty' is the current folder, which cannot be "
+                                        "replaced; go to another one"));
+  fs::current_path(here);
   EXPECT_THAT([] { StagedOutput::check("/dev/null", Kind::file, true); },
               ThrowsMessage<UsageError>("'/dev/null' is not an ordinary file"));
+}
+
+TEST(StagedOutput, ATargetIsWrittenOnceAtATime) {
+  const test::ScratchFolder scratch;
+  fs::create_symlink("a.vdb", scratch / "link.vdb");
+  const auto written = [](const fs::path& path) {
+    return ThrowsMessage<UsageError>("'" + path.string() + "' is written by another step already");
+  };
+  {
+    StagedOutput output(scratch / "a.vdb", Kind::file);
+    put(output.path(), one);
+    for (const fs::path& path : {scratch / "a.vdb", scratch / "./a.vdb", scratch / "link.vdb"}) {
+      EXPECT_THAT([&] { StagedOutput::check(path, Kind::file, true); }, written(path));
+      EXPECT_THAT([&] { StagedOutput(path, Kind::file); }, written(path));
+    }
+    output.commit();
+  }
+  StagedOutput::check(scratch / "a.vdb", Kind::file, true);
+  EXPECT_THAT(test::filesUnder(scratch.path()), UnorderedElementsAre(Pair("a.vdb", one)));
 }
 
 TEST(StagedOutput, AFullDiskIsAnError) {

@@ -121,10 +121,29 @@ TEST(MeshReader, NamesFormatsThatAreNotReadYet) {
   EXPECT_EQ(refusal(" \n{\n \"asset\": {}}"), expected("glTF (.gltf, or other JSON)"));
   EXPECT_EQ(refusal("DRACO\x02\x02"), expected("Draco (.drc)"));
   EXPECT_EQ(refusal("ISO-10303-21;\n"), expected("STEP"));
+  EXPECT_EQ(refusal(std::string("\xFF\xFEs\0o\0", 6)), expected("text in UTF-16"));
+  EXPECT_EQ(refusal("\xFE\xFF"), expected("text in UTF-16"));
+  EXPECT_EQ(refusal("\x1F\x8B\x08"), expected("a gzip archive"));
+  EXPECT_EQ(refusal("<?xml version=\"1.0\"?>"), expected("XML (AMF, COLLADA or X3D)"));
+  EXPECT_EQ(refusal("#VRML V2.0 utf8\n"), expected("VRML"));
+  EXPECT_EQ(refusal("# vtk DataFile Version 4.2\n"), expected("VTK"));
+  EXPECT_EQ(refusal("Kaydara FBX Binary  "), expected("FBX"));
   const std::string unknown = "': not a mesh in a format that is read; export " + meshFormatNames();
   EXPECT_EQ(refusal("Dear reader,\n"), "'part" + unknown);
   EXPECT_EQ(refusal(std::string(1000, '\0')), "'part" + unknown);
   EXPECT_EQ(refusal("Dear reader,\n", "a\nb"), "'a?b" + unknown);
+}
+
+TEST(MeshReader, ATextMayBeFilledUpWithZerosButHasNoneWithin) {
+  const Mesh mesh = floatPart();
+  for (const std::string& text : {asciiStl(mesh), objText(mesh)}) {
+    expectSame(parseQuietly(text + "\x1A"), mesh);
+    expectSame(parseQuietly(text + std::string(3000, '\0')), mesh);
+    const std::string begin = text + std::string(2000, '\n');
+    EXPECT_EQ(refusal(begin + std::string(3, '\0') + text),
+              "'part', byte " + std::to_string(begin.size()) +
+                  ": a zero, so this is no text; export it again");
+  }
 }
 
 TEST(MeshReader, RefusesFilesWithoutTriangles) {
@@ -135,6 +154,33 @@ TEST(MeshReader, RefusesFilesWithoutTriangles) {
   EXPECT_EQ(refusal("v 0 0 0\nv 1 0 0\nl 1 2\n"), expected);
   EXPECT_EQ(refusal("v 0 0 0\nv 1 0 0\nf 1 2\n"), expected);
   EXPECT_EQ(refusal("ply\nformat ascii 1.0\nend_header\n"), expected);
+}
+
+/// A file of zeros behind `begin`, which takes no room on the disk.
+std::filesystem::path sparse(const ScratchFolder& folder, const std::string& begin,
+                             std::uintmax_t size) {
+  const auto path = folder.write("sparse.stl", begin);
+  std::filesystem::resize_file(path, size);
+  return path;
+}
+
+TEST(MeshReader, RefusesWhatAHeaderShowsToBeWrongBeforeItReadsTheFile) {
+  // Larger than memory, so that reading it could not succeed.
+  constexpr std::uintmax_t size = std::uintmax_t{1} << 35;
+  const ScratchFolder folder;
+  const std::string box = binaryStl(boxMesh({0, 0, 0}, {1, 1, 1}));
+  const std::string ply = "ply\nformat binary_little_endian 1.0\nelement vertex 4294967294\n"
+                          "property double x\nproperty double y\nproperty double z\nend_header\n";
+  const std::string counts = " triangles, which are not what its 34359738368 bytes hold";
+  for (const auto& [begin, why] : std::map<std::string, std::string>{
+           {"", "holds no triangles but zeros, as far as 65536 bytes tell"},
+           {box, "its header announces 12" + counts},
+           {box.substr(0, 80) + std::string("\0\0\0\x7F", 4) + box.substr(84),
+            "the header announces 2130706432 triangles, the file holds 687194765"},
+           {ply, "element 'vertex' counts more than the file holds, 4294967294"},
+           {"OFF\n4294967294 9000000000 0\n", "more than the file holds: it is cut off"}}) {
+    EXPECT_THAT(refusalOfPath(sparse(folder, begin, size)), HasSubstr(why));
+  }
 }
 
 TEST(MeshReader, ReadsOrRefusesEveryPrefix) {

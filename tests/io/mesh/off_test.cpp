@@ -22,7 +22,8 @@ void expectTriangle(const Mesh& mesh) {
 
 TEST(Off, UnderstandsEveryFormOfItsHeader) {
   for (const char* header :
-       {"OFF\n3 1 0\n", "OFF\r\n3 1 3\r\n", "OFF\r3 1\r", "OFF 3 1 0\n", "OFF3 1 0\n",
+       {"OFF\n3 1 0\n", "OFF\r\n3 1 3\r\n", "OFF\r3 1\r", "OFF 3 1 0\n", "OFF3 1 0\n", "off\n3 1\n",
+        "OFF\n3\n1\n",
         "\xEF\xBB\xBF\n OFF # by hand\n\n# counts\n 3\t1 0 # edges are not counted\n"}) {
     SCOPED_TRACE(header);
     expectTriangle(parseQuietly(header + corners + "3 0 1 2"));
@@ -49,18 +50,38 @@ TEST(Off, CutsPolygonsIntoTriangles) {
   EXPECT_EQ(cube.triangles[1], (Mesh::Triangle{0, 3, 2}));
 }
 
+const std::string tetrahedron =
+    "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+
+TEST(Off, ReadsByWordsWhereLinesAreNoElements) {
+  const Mesh mesh = parseQuietly("OFF\n4 4 6\n" + tetrahedron);
+  for (const char* text :
+       {"OFF 4 4 6 0 0 0 1 0 0 0 1 0 0 0 1 3 0 2 1 3 0 1 3 3 0 3 2 3 1 2 3",
+        "OFF\n4 4 6\n0 0 0 1 0 0\n0 1 0 0 0 1\n3 0 2 1\n3 0 1 3 # side\n3 0 3 2\n3 1 2 3\n",
+        "OFF\n4 4 6\n0\n0\n0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1 255 0 0\n3 0 1 3\n3 0 3 2\n3 1 2 3\n",
+        "NOFF\n4 4 6\n0 0 0 0 0 1 1 0 0 0 0 1 0 1 0 0 0 1 0 0 1\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 "
+        "2 3 1 2 3\n"}) {
+    SCOPED_TRACE(text);
+    expectSame(parseQuietly(text), mesh);
+  }
+}
+
 TEST(Off, WarnsOfWhatItPassesOver) {
   Warnings warnings;
-  expectTriangle(parse("OFF\n3 3 0\n" + corners + "2 0 1\n3 0 1 2\n0\n3 0 1 2\n", &warnings));
-  EXPECT_THAT(warnings, ElementsAre("'part': ignored 2 faces with fewer than 3 corners",
-                                    "'part': ignored 8 bytes after the last face"));
+  parse("OFF\n4 6 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n2 0 1\n0\n" + tetrahedron.substr(24) + "more\n",
+        &warnings);
+  EXPECT_THAT(warnings, ElementsAre("'part': ignored 5 bytes after the last face",
+                                    "'part': ignored 2 faces with fewer than 3 corners"));
+  EXPECT_EQ(refusal("OFF\n3 1 0\n" + corners + "3 0 1 2\n3 0 1 2\n"),
+            "'part', byte 36: 8 bytes follow the last face and the triangles before do not close: "
+            "the file is not as its header says; export it again");
 }
 
 TEST(Off, RefusesABadHeader) {
   const std::string remedy = "; export or download it again";
   EXPECT_EQ(refusal("OFF\n"),
             "'part', line 2: the header is missing: the file is cut off here" + remedy);
-  for (const char* counts : {"BINARY\n", "3\n1\n", "3 -1 0\n", "3 1.5 0\n"}) {
+  for (const char* counts : {"BINARY\n", "3\n", "3 -1 0\n", "3 1.5 0\n"}) {
     EXPECT_EQ(refusal(std::string("OFF ") + counts),
               "'part', line 1: the header must count vertices and faces; binary OFF is not read" +
                   remedy);

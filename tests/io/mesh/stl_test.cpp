@@ -3,6 +3,9 @@
 #include <limits>
 #include <map>
 #include <random>
+#include <regex>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -95,6 +98,69 @@ TEST(Stl, RefusesABinaryFileThatIsCutOff) {
       "'part': cut off: a binary STL has at least 84 bytes, this one has 25; export it again");
 }
 
+/// A binary STL of which an attribute of as many bytes follows each record.
+std::string withAttributes(const Mesh& mesh, const std::vector<std::size_t>& sizes) {
+  const std::string plain = binaryStl(mesh);
+  std::string bytes = plain.substr(0, 84);
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::size_t size = sizes[i % sizes.size()];
+    bytes += plain.substr(84 + 50 * i, 48);
+    bytes += static_cast<char>(size % 256);
+    bytes += static_cast<char>(size / 256);
+    bytes.append(size, '\x5A');
+  }
+  return bytes;
+}
+
+TEST(Stl, SkipsTheAttributesThatTheSizeOfTheFileExplains) {
+  const Mesh mesh = floatPart();
+  Mesh open = mesh;
+  open.triangles.pop_back();
+  for (const std::vector<std::size_t>& sizes :
+       std::vector<std::vector<std::size_t>>{{2}, {0, 0, 4}, {300}, {1}, {50}, {25, 25}}) {
+    const std::string bytes = withAttributes(mesh, sizes);
+    Warnings warnings;
+    expectSame(parse(bytes, &warnings, "part.stl"), mesh);
+    EXPECT_THAT(warnings, testing::IsEmpty());
+    EXPECT_EQ(parse(withAttributes(open, sizes), nullptr, "part.stl").triangles, open.triangles);
+  }
+}
+
+TEST(Stl, TakesAttributesForColoursWhereTheSizeLeavesNoRoom) {
+  const Mesh mesh = floatPart();
+  std::string bytes = binaryStl(mesh);
+  for (std::size_t end = 84 + 50; end <= bytes.size(); end += 50) bytes[end - 2] = '\x1F';
+  expectSame(parseQuietly(bytes), mesh);
+}
+
+TEST(Stl, BytesBehindAnOpenMeshMeanThatItWasMisread) {
+  Mesh open = floatPart();
+  open.triangles.pop_back();
+  const std::string bytes = binaryStl(open);
+  EXPECT_EQ(refusal(bytes + "colour", "part.stl"),
+            "'part.stl', byte " + std::to_string(bytes.size()) +
+                ": 6 bytes follow the last triangle and the triangles before do not close: the "
+                "file is not as its header says; export it again");
+  // Records of 52 bytes whose last two count nothing.
+  std::string longer = bytes.substr(0, 84);
+  for (std::size_t i = 0; i < open.triangles.size(); ++i)
+    longer += bytes.substr(84 + 50 * i, 50) + "xy";
+  EXPECT_THAT(refusal(longer, "part.stl"), HasSubstr("do not close"));
+  EXPECT_THAT(refusal(bytes + std::string(50, 'x'), "part.stl"), HasSubstr("do not close"));
+  for (const std::string& blank : {std::string("\r\n"), std::string(130, '\0'), std::string("\x1A")})
+    EXPECT_EQ(parse(bytes + blank, nullptr, "part.stl").triangles, open.triangles);
+}
+
+TEST(Stl, ReadsBinaryFilesOneBehindAnother) {
+  const Mesh box = boxMesh({0, 0, 0}, {1, 1, 1});
+  const Mesh ball = floatPart();
+  Warnings warnings;
+  const Mesh mesh = parse(binaryStl(box) + binaryStl(ball), &warnings, "part.stl");
+  EXPECT_EQ(mesh.triangles.size(), box.triangles.size() + ball.triangles.size());
+  EXPECT_THAT(warnings,
+              ElementsAre("'part.stl': read all of 2 binary STL files, one behind another"));
+}
+
 TEST(Stl, AHeaderThatAnnouncesFourBillionTrianglesIsRefused) {
   std::string bytes = binaryStl(boxMesh({0, 0, 0}, {1, 1, 1}));
   bytes[83] = '\x7F';
@@ -129,26 +195,78 @@ TEST(Stl, ToleratesCapitalsTabsRemarksAndAMissingFinalNewline) {
   EXPECT_THAT(mesh.vertices, ElementsAre(Vec3d(1, 0.5, 0), Vec3d(1, 20, 3), Vec3d(0, 0, 0)));
 }
 
+TEST(Stl, ReadsTextByWordsAndNotByLines) {
+  const Mesh mesh = floatPart();
+  const std::string text = asciiStl(mesh);
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return std::regex_replace(text, std::regex(from), to);
+  };
+  const std::map<std::string, std::string> texts{
+      {"two words", with("end(loop|facet|solid)", "end $1")},
+      {"two words, capitals", with("end(loop|facet|solid)", "END  $1")},
+      {"a facet on a line", with("\\n +(outer|vertex|endloop|endfacet)", " $1")},
+      {"all on a line", with("\\s+", " ")},
+      {"a word on a line", with("(facet|normal|outer|loop|vertex) ", "$1\n")},
+      {"a glued name", with("endsolid part", "endsolidpart")},
+      {"no names", with("solid part", "solid")},
+      {"a name like a keyword", with("solid part", "solid facet normal loop")},
+      {"colours", with("(solid part|1?\\.0*e\\+00)\\n", "$1\n color 0.5 0.5 0.5\n")},
+      {"remarks", with("\\n", " # a remark\n// another vertex\n; and one\ncomment more\n")},
+      {"filled up", text + std::string("\x1A\0\0", 3)},
+      {"a remark in front", "# made by hand\n" + text},
+      {"no solid", with("(end)?solid part\\n", "")},
+      {"no loops", with(" +(outer loop|endloop)\\n", "")},
+      {"no ends of facets", with(" +endfacet\\n", "")},
+      {"no ends of loops", with(" +endloop\\n", "")},
+      {"no normals", with(" normal [^\\n]*", "")},
+      {"normals that are no numbers", with("normal [^\\n]*", "normal -nan(ind) 1.#QNAN nan")}};
+  for (const auto& [kind, changed] : texts) {
+    SCOPED_TRACE(kind);
+    ASSERT_NE(changed, text);
+    expectSame(parseQuietly(changed), mesh);
+  }
+}
+
+TEST(Stl, WarnsOfTextThatMayBeCutOff) {
+  const Mesh mesh = floatPart();
+  const std::string text = asciiStl(mesh);
+  Warnings warnings;
+  expectSame(parse(text.substr(0, text.find("endsolid")), &warnings), mesh);
+  EXPECT_THAT(warnings, ElementsAre("'part', line 562: the file ends without 'endsolid': it may "
+                                    "have been cut off"));
+}
+
 TEST(Stl, RefusesAsciiThatIsNotAsItShouldBe) {
   const auto body = [](const std::string& lines) { return refusal("solid x\n" + lines); };
   const std::string loop = "facet normal 0 0 1\nouter loop\n";
   const std::string corners = "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n";
-  EXPECT_EQ(body(loop + corners + "endloop\nendfacet\n"),
-            "'part', line 9: cut off: the file ends without 'endsolid'; export or download it "
-            "again");
+  EXPECT_EQ(body(loop + corners),
+            "'part', line 7: cut off: the file ends within a facet; export or download it again");
+  EXPECT_EQ(body(loop + "vertex 0 0"),
+            "'part', line 4: cut off: the file ends within a facet; export or download it again");
   EXPECT_EQ(body(loop + corners + "vertex 1 1 0\nendloop\n"),
             "'part', line 8: a facet has 4 corners instead of 3; export triangles only");
-  EXPECT_EQ(body(loop + "vertex 0 0\n"),
+  EXPECT_EQ(body(loop + "vertex 0 0\nendloop\n"),
             "'part', line 4: a vertex is not three numbers; repair the line or export again");
   EXPECT_EQ(body(loop + "vertex 0 0,5 1\n"),
             "'part', line 4: a vertex is not three numbers; repair the line or export again");
   EXPECT_EQ(body(loop + "vertex 0 1e999 1\n"),
             "'part', line 4: vertex is not finite (0 inf 1); repair the mesh");
   EXPECT_EQ(body(corners), "'part', line 2: vertex outside of a loop; export it again");
-  EXPECT_EQ(body(loop + corners + "endfacet\n"),
+  EXPECT_EQ(body(loop + corners + "facet normal 0 0 1\n"),
             "'part', line 7: the loop before is not closed; export it again");
+  EXPECT_EQ(body(loop + corners + "endsolid\n"),
+            "'part', line 7: the loop before is not closed; export it again");
+  EXPECT_EQ(body(loop + "outer loop\n"),
+            "'part', line 4: the loop before is not closed; export it again");
+  EXPECT_EQ(body(loop + "vertex 0 0 0\nvertex 1 0 0\nendfacet\n"),
+            "'part', line 6: a facet has 2 corners instead of 3; export triangles only");
+  EXPECT_EQ(body(loop + "vertex 0 0 0 0\n"),
+            "'part', line 4: a vertex is not three numbers; repair the line or export again");
   EXPECT_EQ(body("facets\n"),
             "'part', line 2: 'facets' is no keyword of STL; repair the line or export again");
+  EXPECT_EQ(body("end of it\n"),
+            "'part', line 2: 'end of' is no keyword of STL; repair the line or export again");
 }
 
 }  // namespace

@@ -74,5 +74,33 @@ TEST(TextCursor, ContinuesALineAfterABackslash) {
   EXPECT_TRUE(cursor.atLineEnd());
 }
 
+TEST(TextCursor, ContinuesALineAfterABackslashAndBlanks) {
+  const std::string text = "1 \\ \t\n2 \\ x\n\\";
+  TextCursor cursor(text);
+  EXPECT_EQ(cursor.number(), 1.0);
+  EXPECT_EQ(cursor.number(), 2.0);
+  EXPECT_EQ(cursor.word(), "\\");
+  EXPECT_EQ(cursor.word(), "x");
+  EXPECT_EQ(cursor.word(), "");
+  cursor.skipSpace();
+  EXPECT_EQ(cursor.word(), "\\");
+  EXPECT_TRUE(cursor.atEnd());
+}
+
+TEST(TextCursor, PassesOverCommentsWhereTheFormatHasThem) {
+  const std::string text = "1#2 3\n# 4 \\\n a\"!#5\r\n6 #";
+  TextCursor cursor(text, TextCursor::Comments::hash);
+  EXPECT_EQ(cursor.number(), 1.0);
+  EXPECT_EQ(cursor.word(), "");
+  EXPECT_TRUE(cursor.atLineEnd());
+  cursor.skipSpace();
+  EXPECT_EQ(cursor.word(), "a\"!");
+  cursor.skipSpace();
+  EXPECT_EQ(cursor.number(), 6.0);
+  EXPECT_EQ(cursor.word(), "");
+  EXPECT_TRUE(cursor.atEnd());
+  EXPECT_EQ(TextCursor("1#2").word(), "1#2");
+}
+
 }  // namespace
 }  // namespace vdbdither

@@ -71,7 +71,7 @@ TEST_P(SliceFormats, ReadsBackWhatItWrites) {
   for (const char* name : {"folder", "archive.zip"}) {
     write(scratch_ / name);
     std::vector<std::string> warnings;
-    const StackReader reader(scratch_ / name,
+    const StackReader reader(scratch_ / name, EditedStack::refused,
                              [&](const std::string& text) { warnings.push_back(text); });
     EXPECT_EQ(&reader.format(), GetParam());
     EXPECT_EQ(reader.manifest().layers, layers);
@@ -93,6 +93,8 @@ TEST_P(SliceFormats, ItsManifestNamesEverySliceOnce) {
   for (const Manifest::Slice& slice : stack.slices) {
     EXPECT_TRUE(names.insert(slice.file).second) << slice.file;
     EXPECT_TRUE(there.contains(slice.file)) << slice.file;
+    EXPECT_TRUE(slice.file.ends_with(GetParam()->ending)) << slice.file;
+    EXPECT_TRUE(namesSlice(slice.file)) << slice.file;
   }
   EXPECT_THAT(stack.slices.front().file, HasSubstr("s007."));
 }
@@ -125,7 +127,8 @@ TEST_P(SliceFormats, LeavesOutTheBlankLayersBelowAndAboveThePart) {
   EXPECT_EQ(made.layers, keeps ? layers : printed);
   EXPECT_EQ(made.knownLayers(), layers);
   EXPECT_THAT(made.slices.front().file, HasSubstr("s007."));
-  const StackReader reader(scratch_ / "out", [](const std::string& text) { FAIL() << text; });
+  const StackReader reader(scratch_ / "out", EditedStack::refused,
+                           [](const std::string& text) { FAIL() << text; });
   EXPECT_EQ(reader.manifest().cropped_below, keeps ? 0 : 3);
   EXPECT_EQ(reader.manifest().cropped_above, keeps ? 0 : 7);
   for (int z = layers.begin; z < layers.end; ++z)
@@ -151,7 +154,7 @@ TEST_P(SliceFormats, ASpoiltFileIsDecodedOrRefused) {
       test::filesUnder(scratch_ / "out").at(stack.slices.front().file);
   const auto expect_decoded_or_refused = [&](std::span<const std::uint8_t> spoilt) {
     try {
-      GetParam()->decode(spoilt);
+      GetParam()->decode(spoilt, {});
     } catch (const DataError& error) {
       EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
     }
@@ -164,6 +167,23 @@ TEST_P(SliceFormats, ASpoiltFileIsDecodedOrRefused) {
     spoilt[random() % spoilt.size()] = static_cast<std::uint8_t>(random());
     expect_decoded_or_refused(spoilt);
   }
+}
+
+TEST_P(SliceFormats, ItsDecoderTellsTheSizeBeforeItReadsPixels) {
+  const Manifest stack = write(scratch_ / "out");
+  const std::vector<std::uint8_t> bytes =
+      test::filesUnder(scratch_ / "out").at(stack.slices.front().file);
+  // The pixels of a PNG are missing.
+  constexpr std::size_t png_header = 66;
+  const std::span<const std::uint8_t> given =
+      std::span(bytes).first(GetParam()->ending == ".png" ? png_header : bytes.size());
+  EXPECT_THAT(
+      [&] {
+        GetParam()->decode(given, [](std::uint32_t width, std::uint32_t height) {
+          throw DataError(std::to_string(width) + " x " + std::to_string(height));
+        });
+      },
+      ThrowsMessage<DataError>("19 x 11"));
 }
 
 TEST_P(SliceFormats, IsFoundByItsName) { EXPECT_EQ(findSliceFormat(GetParam()->name), GetParam()); }
@@ -180,6 +200,13 @@ TEST(SliceFormatTable, IsListedInMessages) {
   EXPECT_EQ(findSliceFormat("jpeg"), nullptr);
 }
 
+TEST(SliceFormatTable, KnowsTheEndingsOfSlices) {
+  for (const char* name : {"a.png", "A.PNG", "a/b.tif", "a.Tiff", "a.exr"})
+    EXPECT_TRUE(namesSlice(name)) << name;
+  for (const char* name : {"png", ".png", "a.vdb", "a.png.vdb", "a", "a.", ""})
+    EXPECT_FALSE(namesSlice(name)) << name;
+}
+
 TEST(StackReader, RefusesAFormatThatIsNotInTheTable) {
   const test::ScratchFolder scratch;
   Manifest stack;
@@ -189,7 +216,7 @@ TEST(StackReader, RefusesAFormatThatIsNotInTheTable) {
   stack.layers = stack.lattice.layers();
   scratch.write("manifest.json", textOf(stack));
   EXPECT_THAT(
-      [&] { StackReader(scratch.path(), {}); },
+      [&] { StackReader(scratch.path(), EditedStack::refused, {}); },
       ThrowsMessage<DataError>(HasSubstr("there is no format 'jpeg'; make the stack again")));
 }
 

@@ -18,6 +18,8 @@ using Bytes = std::vector<std::uint8_t>;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
+constexpr std::uint64_t any = 1 << 30;
+
 Bytes bytesOf(const std::string& text) { return {text.begin(), text.end()}; }
 
 TEST(Zip, FilesComeBackByName) {
@@ -28,11 +30,11 @@ TEST(Zip, FilesComeBackByName) {
   writer.add("empty", {});
   writer.finish();
   ZipReader reader(scratch / "a.zip");
-  EXPECT_EQ(reader.read("folder/zwei-ä.bin"), Bytes(100000, 7));
-  EXPECT_EQ(reader.read("one.txt"), bytesOf("first"));
-  EXPECT_EQ(reader.read("empty"), Bytes());
+  EXPECT_EQ(reader.read("folder/zwei-ä.bin", any), Bytes(100000, 7));
+  EXPECT_EQ(reader.read("one.txt", any), bytesOf("first"));
+  EXPECT_EQ(reader.read("empty", any), Bytes());
   EXPECT_FALSE(reader.contains("two"));
-  EXPECT_THAT([&] { static_cast<void>(reader.read("two")); },
+  EXPECT_THAT([&] { static_cast<void>(reader.read("two", any)); },
               ThrowsMessage<DataError>(HasSubstr("holds no file 'two'")));
 }
 
@@ -71,11 +73,75 @@ TEST(Zip, DamageIsFound) {
   bytes[text.find("some")] ^= 1;
   writeFile(scratch / "a.zip", bytes, "a.zip");
   ZipReader reader(scratch / "a.zip");
-  EXPECT_THAT([&] { static_cast<void>(reader.read("x")); },
+  EXPECT_THAT([&] { static_cast<void>(reader.read("x", any)); },
               ThrowsMessage<DataError>(HasSubstr("its file 'x' is damaged")));
   std::ofstream(scratch / "b.zip") << "no archive";
   EXPECT_THAT([&] { ZipReader(scratch / "b.zip"); },
               ThrowsMessage<DataError>(HasSubstr("b.zip' is not a readable zip archive")));
+}
+
+/// An archive of empty files with these names.
+std::filesystem::path archiveOf(const test::ScratchFolder& scratch,
+                                const std::vector<std::string>& names) {
+  ZipWriter writer(scratch / "a.zip", "a.zip");
+  for (const std::string& name : names) writer.add(name, {});
+  writer.finish();
+  return scratch / "a.zip";
+}
+
+TEST(Zip, RefusesNamesThatLeaveTheFolderAndNamesThatAreThereTwice) {
+  const test::ScratchFolder scratch;
+  const std::vector<std::pair<std::string, std::string>> refusals{
+      {"../x", "has no proper name: it has a folder whose name is '..'"},
+      {"a/../../x", "has no proper name: it has a folder whose name is '..'"},
+      {"/etc/x", "has no proper name: it is an absolute path"},
+      {"C:\\x", "has no proper name: it contains '\\'"},
+      {"a\nb", "has no proper name: it contains the unprintable character U+000A"},
+      {"..", "has no proper name: it is '..'"},
+      {"", "has no proper name: it is empty"},
+      {"one", "is there twice"},
+      {std::string(300, 'a'), "has no proper name: it has 300 bytes; the maximum is 255"}};
+  for (const auto& [name, why] : refusals) {
+    const std::filesystem::path archive = archiveOf(scratch, {"one", name});
+    EXPECT_THAT([&] { ZipReader{archive}; },
+                ThrowsMessage<DataError>(HasSubstr(": its member '" + name + "' " + why +
+                                                   "; pack the folder of the stack again")));
+  }
+}
+
+TEST(Zip, PassesOverFolders) {
+  const test::ScratchFolder scratch;
+  const ZipReader reader(archiveOf(scratch, {"white/", "white/a"}));
+  EXPECT_THAT(reader.names(), testing::ElementsAre("white/a"));
+}
+
+TEST(Zip, RefusesFilesByTheirStatedSize) {
+  const test::ScratchFolder scratch;
+  ZipWriter writer(scratch / "a.zip", "a.zip");
+  writer.add("x", bytesOf("some text"));
+  writer.finish();
+  ZipReader reader(scratch / "a.zip");
+  EXPECT_EQ(reader.size("x"), 9U);
+  EXPECT_EQ(reader.read("x", 9), bytesOf("some text"));
+  EXPECT_THAT([&] { static_cast<void>(reader.read("x", 8)); },
+              ThrowsMessage<DataError>(HasSubstr("'x' has 9 bytes; at most 8 are read")));
+}
+
+TEST(Zip, ADirectoryThatDoesNotHoldWhatItStatesIsDamaged) {
+  const test::ScratchFolder scratch;
+  Bytes bytes = test::fileBytes(archiveOf(scratch, {"one", "two"}));
+  // The number of entries, in the record at the end.
+  constexpr std::size_t end_record = 22;
+  bytes[bytes.size() - end_record + 8] = bytes[bytes.size() - end_record + 10] = 200;
+  writeFile(scratch / "a.zip", bytes, "a.zip");
+  EXPECT_THAT(
+      [&] { ZipReader(scratch / "a.zip"); },
+      ThrowsMessage<DataError>(HasSubstr("is damaged: its directory ends after 2 of 200 members")));
+}
+
+TEST(Zip, IsAnOrdinaryFile) {
+  EXPECT_THAT([] { ZipReader("/dev/zero"); },
+              ThrowsMessage<DataError>("'/dev/zero' is not an ordinary file"));
 }
 
 }  // namespace

@@ -113,6 +113,157 @@ TEST(AdaptedAmplitude, OfTheTableIsThatOfAFacetNearBy) {
   }
 }
 
+struct Choice {
+  float checker, amplitude;
+};
+
+struct CoarseLattice {
+  Vec3d pitch_mm;
+  std::vector<Choice> choices;
+};
+
+/// What the sum over all waves that the blur leaves chooses, computed once without a bound on their
+/// number: for facets tilted from x and from z by 1°, 3°, 8°, 20°, 35° and 50°.
+const std::vector<CoarseLattice> coarse_lattices{{{0.1, 0.1, 0.1},
+                                                  {{0, 2},
+                                                   {0, 2},
+                                                   {0, 2},
+                                                   {0, 2},
+                                                   {1, 0.5},
+                                                   {1, 0.5},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0}}},
+                                                 {{0.2, 0.2, 0.2},
+                                                  {{1, 0.5},
+                                                   {1, 0.5},
+                                                   {1, 0.5},
+                                                   {1, 0.5},
+                                                   {1, 0.25},
+                                                   {1, 0.25},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0}}},
+                                                 {{0.4, 0.4, 0.4},
+                                                  {{0.5, 0},
+                                                   {0.5, 0},
+                                                   {0.5, 0},
+                                                   {0.5, 0},
+                                                   {0.5, 0},
+                                                   {0.5, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0}}},
+                                                 {{1, 1, 1},
+                                                  {{0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0},
+                                                   {0, 0}}},
+                                                 {{1, 0.1, 0.1},
+                                                  {{0, 2},
+                                                   {1, 0},
+                                                   {0, 2},
+                                                   {1, 0},
+                                                   {1, 1},
+                                                   {1, 0},
+                                                   {1, 1},
+                                                   {1, 0},
+                                                   {1, 1},
+                                                   {0, 0},
+                                                   {1, 0},
+                                                   {1, 0}}},
+                                                 {{0.6, 0.6, 0.1},
+                                                  {{1, 0.25},
+                                                   {0, 0},
+                                                   {1, 0.25},
+                                                   {0, 0},
+                                                   {1, 0},
+                                                   {0, 0},
+                                                   {1, 0},
+                                                   {0, 0},
+                                                   {1, 0},
+                                                   {0, 0},
+                                                   {1, 0},
+                                                   {0, 0}}},
+                                                 {{0.5, 0.005, 0.5},
+                                                  {{1, 1},
+                                                   {1, 1},
+                                                   {1, 1},
+                                                   {1, 1},
+                                                   {1, 1},
+                                                   {1, 1},
+                                                   {1, 1},
+                                                   {1, 1},
+                                                   {1, 0},
+                                                   {1, 1},
+                                                   {1, 0},
+                                                   {1, 0}}},
+                                                 {{0.1, 0.1, 10},
+                                                  {{1, 0},
+                                                   {1, 1},
+                                                   {1, 0},
+                                                   {1, 1},
+                                                   {1, 0},
+                                                   {1, 1},
+                                                   {0, 0},
+                                                   {1, 0},
+                                                   {0, 0},
+                                                   {1, 0},
+                                                   {0, 0},
+                                                   {1, 0}}}};
+
+TEST(AdaptedAmplitude, OnCoarseLatticesIsThatOfAllWaves) {
+  for (const CoarseLattice& lattice : coarse_lattices) {
+    auto expected = lattice.choices.begin();
+    for (const double degrees : {1.0, 3.0, 8.0, 20.0, 35.0, 50.0}) {
+      for (const int axis : {0, 2}) {
+        const FacetDither facet = bestFacetDither(tilted(axis, degrees), lattice.pitch_mm, 0.05);
+        EXPECT_EQ(facet.checker, expected->checker) << lattice.pitch_mm << degrees << axis;
+        EXPECT_EQ(facet.amplitude, expected->amplitude) << lattice.pitch_mm << degrees << axis;
+        ++expected;
+      }
+    }
+  }
+}
+
+TEST(AdaptedAmplitude, IsFoundForAllFacetsOfAnyLattice) {
+  // Without a bound on the waves, each of the first lattices takes minutes or hours.
+  for (const Vec3d& pitch_mm : {Vec3d(10, 10, 10), Vec3d(10, 0.1, 10), Vec3d(0.1, 10, 10),
+                                Vec3d(0.5, 0.005, 0.5), Vec3d(0.005, 0.005, 0.005)}) {
+    const AdaptedAmplitude adapted(pitch_mm, 0.05);
+    std::mt19937 random(7);
+    std::normal_distribution<float> normal;
+    for (int n = 0; n < 20000; ++n) {
+      Vec3s at(normal(random), normal(random), normal(random));
+      at.normalize();
+      const FacetDither facet = adapted(at);
+      ASSERT_LE(facet.checker + facet.amplitude, 2);
+      // A voxel of 10 mm cannot hide in a blur of 0.1 mm.
+      if (pitch_mm == Vec3d(10, 10, 10)) {
+        ASSERT_EQ(facet.checker, 0);
+        ASSERT_EQ(facet.amplitude, 0);
+      }
+    }
+  }
+}
+
 TEST(AdaptedAmplitude, IsNothingForTheZeroVector) {
   const FacetDither facet = AdaptedAmplitude(lattices[0], 0.05)(Vec3s(0.0F));
   EXPECT_EQ(facet.checker, 0);

@@ -225,6 +225,17 @@ TEST(SolidBodies, SourcesCountThroughAllBodies) {
   expectNearSources(solids.whole, given, 0.3);
 }
 
+TEST(SolidBodies, ARefusalNamesTheBody) {
+  const Mesh bent{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}, {0, 0, 4}, {0, 4, 4}},
+                  {{0, 1, 3}, {0, 3, 2}, {0, 4, 5}, {0, 5, 2}}};
+  try {
+    solidBodies({sphereMesh({0, 0, 0}, 1, 8), bent});
+    FAIL() << "no body was refused";
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), testing::StartsWith("mesh 2 of 2: the triangles bound no volume: "));
+  }
+}
+
 TEST(SolidBodies, OneBodyIsTheWhole) {
   const Mesh ball = sphereMesh({0, 0, 0}, 1, 8);
   const SolidBodies solids = solidBodies({ball});

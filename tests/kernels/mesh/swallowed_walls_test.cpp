@@ -1,17 +1,26 @@
 #include "ops/kernels/mesh/swallowed_walls.h"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <csignal>
+#include <cstdlib>
 #include <limits>
+#include <numbers>
 #include <random>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <openvdb/math/BBox.h>
+#include <tbb/global_control.h>
 
 #include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/mesh_repair.h"
+#include "ops/kernels/mesh/winding_number.h"
 #include "tests/support/shapes.h"
+#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 namespace {
@@ -160,6 +169,224 @@ TEST(SwallowedWalls, ACavityIsSurface) {
   Mesh cavity = test::boxMesh({0.3, 0.3, 0.3}, {0.7, 0.7, 0.7});
   for (Mesh::Triangle& t : cavity.triangles) std::swap(t[0], t[1]);
   EXPECT_TRUE(swallowedWalls(joined({test::boxMesh({0, 0, 0}, {1, 1, 1}), cavity})).hidden.empty());
+}
+
+/// Whether a place on a triangle is left as surface.
+bool isLeft(const SwallowedWalls& walls, std::uint32_t triangle, const Vec3d& p) {
+  if (walls.hidden.empty() || !walls.hidden[triangle]) return true;
+  for (std::uint32_t piece = 0; piece < walls.piece_of.size(); ++piece) {
+    if (walls.piece_of[piece] != triangle) continue;
+    const auto at = cornersOf(walls.pieces, piece);
+    const Vec3d area = (at[1] - at[0]).cross(at[2] - at[0]);
+    bool inside = area.length() > 0;
+    for (std::size_t side = 0; side < 3; ++side)
+      inside &= area.dot((at[(side + 1) % 3] - at[side]).cross(p - at[side])) >= 0;
+    if (inside) return true;
+  }
+  return false;
+}
+
+/// Checks places on every triangle against the winding numbers on both sides. Returns how many are
+/// surface.
+std::size_t expectWallsWhereOneSideIsSolid(const Mesh& mesh, int places) {
+  const SwallowedWalls walls = swallowedWalls(mesh);
+  const WindingNumber winding(mesh);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> share(0, 1);
+  std::size_t left = 0;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int place = 0; place < places; ++place) {
+      const auto [a, b, c] = cornersOf(mesh, t);
+      const double one = share(random);
+      const double two = share(random) * (1 - one);
+      const Vec3d p = a + (b - a) * one + (c - a) * two;
+      const Vec3d beside = (b - a).cross(c - a).unit() * 1e-5;
+      const auto isSolid = [&](const Vec3d& at) { return std::abs(winding.exactAt(at)) > 0.5; };
+      const bool is_surface = isSolid(p + beside) != isSolid(p - beside);
+      EXPECT_EQ(isLeft(walls, t, p), is_surface) << t << ' ' << p;
+      left += is_surface ? 1 : 0;
+    }
+  return left;
+}
+
+/// Boxes and balls at random places from the origin to `size`.
+Mesh heapOf(int count, const Vec3d& size, double height) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> share(0, 1);
+  std::vector<Mesh> parts;
+  for (int i = 0; i < count; ++i) {
+    const Vec3d at = size * Vec3d(share(random), share(random), share(random));
+    const Vec3d extent(0.3 + share(random), 0.3 + share(random), height + share(random));
+    parts.push_back(i % 3 == 2 ? test::sphereMesh(at, 0.6, 4) : test::boxMesh(at, at + extent));
+  }
+  return joined(std::move(parts));
+}
+
+TEST(SwallowedWalls, AreWhereBothSidesAreSolid) {
+  const std::size_t row = expectWallsWhereOneSideIsSolid(heapOf(30, {14, 0.3, 0.3}, 0.3), 10);
+  EXPECT_GT(row, 1000U);
+  const std::size_t heap = expectWallsWhereOneSideIsSolid(heapOf(40, {1, 1, 1}, 0.3), 10);
+  EXPECT_GT(heap, 200U);
+  const std::size_t plane = expectWallsWhereOneSideIsSolid(heapOf(30, {2, 2, 0}, 0.5), 10);
+  EXPECT_GT(plane, 200U);
+}
+
+TEST(SwallowedWalls, BoxesWithinEachOtherInOnePlaneAreJudgedWithoutTheirOutlines) {
+  // Cut along all outlines, these walls would fall into millions of pieces.
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> share(0, 1);
+  std::vector<Box> boxes;
+  for (int i = 0; i < 160; ++i) {
+    const Vec3d low(share(random), share(random), 0);
+    boxes.emplace_back(low,
+                       low + Vec3d(0.5 + share(random), 0.5 + share(random), 0.1 + share(random)));
+  }
+  const Mesh mesh = meshOf(boxes);
+  const SwallowedWalls walls = swallowedWalls(mesh);
+  std::size_t bottoms = 0;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto corners = cornersOf(mesh, t);
+    if (corners[0].z() + corners[1].z() + corners[2].z() > 0) continue;
+    EXPECT_FALSE(walls.hidden[t]) << t;
+    ++bottoms;
+  }
+  EXPECT_EQ(bottoms, 2 * boxes.size());
+}
+
+TEST(SwallowedWalls, BoxesOnAPlateCutItAlongTheirOutlinesAlone) {
+  constexpr int across = 24;
+  std::vector<Mesh> parts{test::boxMesh({-1, -1, -1}, {across + 1, across + 1, 0})};
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> share(0, 0.4);
+  for (int i = 0; i < across * across; ++i) {
+    const Vec3d at(i % across + share(random), std::floor(i / across) + share(random), 0);
+    parts.push_back(test::boxMesh(at, at + Vec3d(0.5, 0.5, 0.5)));
+  }
+  const SwallowedWalls walls = swallowedWalls(joined(std::move(parts)));
+  EXPECT_EQ(walls.cut, 2U);
+  EXPECT_EQ(walls.swallowed, 2U * across * across);
+  // The planes of all sides would cut the plate into four times their number squared.
+  EXPECT_LT(walls.pieces.triangles.size(), 40U * across * across);
+}
+
+TEST(SwallowedWalls, SidesInThePlaneOfAWallCutIt) {
+  // The tower's walls have sides at the height of the plate's top, and end there on both sides.
+  Mesh tower = test::boxMesh({1, 1, -1}, {2, 2, 1});
+  tower.vertices.insert(tower.vertices.end(), {{1, 1, 0}, {2, 1, 0}, {1, 2, 0}, {2, 2, 0}});
+  std::vector<Mesh::Triangle> triangles;
+  for (const Mesh::Triangle& t : tower.triangles) {
+    std::array<std::uint32_t, 3> high{};
+    for (std::size_t c = 0; c < 3; ++c) high[c] = tower.vertices[t[c]].z() > 0 ? 1 : 0;
+    if (high[0] == high[1] && high[1] == high[2]) {
+      triangles.push_back(t);
+      continue;
+    }
+    // Rotated so that the corner that is alone comes first. Its sides are cut at the ring.
+    std::size_t alone = 0;
+    while (high[alone] == high[(alone + 1) % 3] || high[alone] == high[(alone + 2) % 3]) ++alone;
+    const std::uint32_t a = t[alone];
+    const std::uint32_t b = t[(alone + 1) % 3];
+    const std::uint32_t c = t[(alone + 2) % 3];
+    const auto between = [&](std::uint32_t from, std::uint32_t to) {
+      const Vec3d middle = 0.5 * (tower.vertices[from] + tower.vertices[to]);
+      for (std::uint32_t v = 8; v < tower.vertices.size(); ++v)
+        if ((tower.vertices[v] - middle).length() < 1e-9) return v;
+      tower.vertices.push_back(middle);
+      return static_cast<std::uint32_t>(tower.vertices.size() - 1);
+    };
+    const std::uint32_t ab = between(a, b);
+    const std::uint32_t ac = between(a, c);
+    triangles.insert(triangles.end(), {{a, ab, ac}, {ab, b, c}, {ab, c, ac}});
+  }
+  tower.triangles = triangles;
+  const Mesh mesh = joined({test::boxMesh({0, 0, -2}, {3, 3, 0}), tower});
+  EXPECT_GT(expectWallsWhereOneSideIsSolid(mesh, 100), 1000U);
+}
+
+TEST(SwallowedWalls, TrianglesThatShareACornerCutEachOther) {
+  // A star drawn without lifting the pen, drawn up to a point and down to another: all walls meet
+  // at these, and each passes through two others.
+  Mesh star;
+  star.vertices = {{0, 0, 1}, {0, 0, -1}};
+  for (int i = 0; i < 5; ++i) {
+    const double turn = 4 * std::numbers::pi * i / 5;
+    star.vertices.emplace_back(std::cos(turn), std::sin(turn), 0);
+  }
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    const std::uint32_t next = (i + 1) % 5;
+    star.triangles.insert(star.triangles.end(), {{0, 2 + i, 2 + next}, {1, 2 + next, 2 + i}});
+  }
+  expectWallsWhereOneSideIsSolid(star, 100);
+  const SwallowedWalls walls = swallowedWalls(star);
+  EXPECT_EQ(walls.cut, 10U);
+  double left = 0;
+  for (std::uint32_t piece = 0; piece < walls.piece_of.size(); ++piece) {
+    const auto [a, b, c] = cornersOf(walls.pieces, piece);
+    left += (b - a).cross(c - a).length();
+  }
+  double whole = 0;
+  for (std::uint32_t t = 0; t < star.triangles.size(); ++t) {
+    const auto [a, b, c] = cornersOf(star, t);
+    whole += (b - a).cross(c - a).length();
+  }
+  // The arms of a pentagram take two parts of its lines that are each the golden ratio squared
+  // shorter than the line.
+  const double golden = std::numbers::phi;
+  EXPECT_NEAR(left / whole, 2 / (golden * golden), 1e-9);
+}
+
+TEST(SwallowedWalls, AreTheSameForAnyNumberOfThreads) {
+  const Mesh mesh = heapOf(60, {3, 3, 3}, 0.5);
+  const SwallowedWalls many = swallowedWalls(mesh);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const SwallowedWalls alone = swallowedWalls(mesh);
+  EXPECT_EQ(alone.hidden, many.hidden);
+  EXPECT_EQ(alone.pieces.vertices, many.pieces.vertices);
+  EXPECT_EQ(alone.pieces.triangles, many.pieces.triangles);
+  EXPECT_EQ(alone.piece_of, many.piece_of);
+  EXPECT_GT(many.cut, 0U);
+}
+
+/// Ends the process with 1 if `work` ends before a signal that comes after `delay`, or long after
+/// it, and with 0 if it throws Interrupted.
+template <class Work>
+[[noreturn]] void endByInterrupt(std::chrono::milliseconds delay, const Work& work) {
+  noteInterrupts();
+  std::atomic<std::chrono::steady_clock::time_point> sent{};
+  std::thread sender([&] {
+    std::this_thread::sleep_for(delay);
+    sent = std::chrono::steady_clock::now();
+    std::raise(SIGINT);
+  });
+  try {
+    work();
+  } catch (const Interrupted&) {
+    sender.join();
+    std::_Exit(std::chrono::steady_clock::now() - sent.load() < std::chrono::seconds(10) ? 0 : 1);
+  }
+  std::_Exit(1);
+}
+
+TEST(SwallowedWalls, ASignalEndsTheSearch) {
+  testing::GTEST_FLAG(death_test_style) = "threadsafe";
+  // Minutes of work, most of it in the search for crossed triangles, or in cutting a few of them.
+  EXPECT_EXIT(endByInterrupt(std::chrono::milliseconds(300),
+                             [] {
+                               swallowedWalls(heapOf(3000, {1, 1, 1}, 0.3));
+                             }),
+              testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(
+      endByInterrupt(std::chrono::milliseconds(1000),
+                     [] {
+                       std::vector<Mesh> parts;
+                       for (int i = 0; i < 2000; ++i) {
+                         const double at = 1e-3 * i;
+                         parts.push_back(test::boxMesh({at, -1, 0}, {at + 1, 9, 0.6 + at}));
+                         parts.push_back(test::boxMesh({-1, at, 0.1}, {9, at + 1, 0.7 + at}));
+                       }
+                       swallowedWalls(joined(std::move(parts)));
+                     }),
+      testing::ExitedWithCode(0), "");
 }
 
 }  // namespace
