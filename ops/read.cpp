@@ -55,12 +55,10 @@ class ReadOperator : public Source {
             "grid 'surface' is fog and holds no distances; resample --grid surface makes "
             "them");
       }
-      if (prototype->getGridClass() != openvdb::GRID_LEVEL_SET ||
-          !prototype->isType<openvdb::FloatGrid>() || statesHeldBand(*prototype))
+      const auto grid = openvdb::gridConstPtrCast<openvdb::FloatGrid>(reader_->held(name));
+      if (!grid || grid->getGridClass() != openvdb::GRID_LEVEL_SET || statesHeldBand(*grid) ||
+          withInsideSigns(grid).signs == InsideSigns::given)
         continue;
-      const Grids whole = reader_->read(schema.lattice.layers());
-      const auto grid = openvdb::gridConstPtrCast<openvdb::FloatGrid>(whole.at(name));
-      if (withInsideSigns(grid).signs == InsideSigns::given) continue;
       throw DataError("grid '" + name +
                       "' is a level set with its inside at +background, as if it were hollow; "
                       "resample --grid " +

@@ -162,7 +162,7 @@ class Resample : public Source {
         history != contents.metadata.end()) {
       schema.metadata.insert(*history);
     }
-    const bool is_asked = !grid_name_.empty();
+    const bool is_clear = !grid_name_.empty() || contents.metadata.contains(history_key);
     const GridConstPtr grid = chosen(contents.grids);
     if (!isOfNumbers(*grid) && !isOfVoxels(*grid))
       throw DataError("grid '" + grid_name_ + "' is of " + grid->valueType() +
@@ -171,7 +171,7 @@ class Resample : public Source {
       throw DataError("grid '" + grid_name_ +
                       "' lies in a frustum; only affine transforms will do");
     checked(Grids::value_type(grid_name_, grid), where);
-    tellUnused(contents.grids, is_asked);
+    tellUnused(contents.grids, is_clear);
     is_voxels_ = isOfVoxels(*grid);
     voxel_mm_ = picoGkVoxelMm(*grid);
     if (!voxel_mm_ && (*grid)["PicoGK.VoxelSize"] && grid->transform().isIdentity())
@@ -182,16 +182,17 @@ class Resample : public Source {
     return withInside(asFloats(grid));
   }
 
-  /// Names the grids that are left out, which may be parts of the same thing, unless the user chose
-  /// among them.
-  void tellUnused(const Grids& grids, bool is_asked) const {
+  /// Names the grids that are left out, which may be parts of the same thing. If the user chose
+  /// among them, or they are those of a job (`is_clear`), a second grid of the same name is told
+  /// only.
+  void tellUnused(const Grids& grids, bool is_clear) const {
     std::string others;
     for (const auto& [name, grid] : grids) {
       if (name == grid_name_) continue;
       others += (others.empty() ? "'" : ", '") + name + "' (" + grid->valueType() + ")";
     }
     const bool has_namesake = grids.contains(grid_name_ + "_2");
-    if (others.empty() || (is_asked && !has_namesake)) return;
+    if (others.empty() || (is_clear && !has_namesake)) return;
     report().warn("only grid '" + grid_name_ + "' is used, not " + others +
                   (has_namesake ? "; '" + grid_name_ +
                                       "_2' is a second grid of that name; csg "

@@ -104,6 +104,12 @@ double SlabReader::memoryBytes() const {
   return bytes;
 }
 
+GridConstPtr SlabReader::held(const std::string& name) const {
+  if (isPipe() || slabs_.empty()) return nullptr;
+  const auto found = slabs_.front().grids.find(name);
+  return found == slabs_.front().grids.end() ? nullptr : found->second;
+}
+
 Grids SlabReader::read(ZRange core) {
   const std::lock_guard lock(mutex_);
   if (isPipe()) takeFrames(core);

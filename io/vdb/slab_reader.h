@@ -27,6 +27,8 @@ class SlabReader : public Input {
   [[nodiscard]] bool isPipe() const override { return frames_ != nullptr; }
   [[nodiscard]] const Schema& schema() const override { return schema_; }
   [[nodiscard]] double memoryBytes() const override;
+  /// A grid of a file as the file holds it, before the first `read`; null on a pipe.
+  [[nodiscard]] GridConstPtr held(const std::string& name) const;
   Grids read(ZRange core) override;
   void readToEnd() override;
 

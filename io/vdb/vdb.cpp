@@ -282,7 +282,9 @@ VdbContents contentsOfBytes(std::string_view bytes, const std::string& where) {
     ArchiveDigest digest;
     digest.update(bytes.data(), bytes.size());
     if (*length != bytes.size() || digest.uuid() != bytes.substr(uuid_offset, uuid_size)) {
-      throw DataError(where + " is damaged: its checksum does not match");
+      throw DataError(where +
+                      " is damaged: its checksum does not match; make it again, and give each run "
+                      "a pipe of its own");
     }
   }
   if (bytes.size() < archive_head_size)

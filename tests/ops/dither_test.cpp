@@ -172,11 +172,14 @@ TEST_F(MaskFile, RefusesAMissingFile) {
 }
 
 TEST_F(MaskFile, RefusesThresholdsOutsideTheOpenUnitInterval) {
-  for (const float bad : {0.0F, 1.0F, -3.0F, std::nanf("")}) {
+  for (const auto& [bad, refusal] :
+       {std::pair(0.0F, "thresholds between 0 and 1"),
+        {1.0F, "thresholds between 0 and 1"},
+        {-3.0F, "thresholds between 0 and 1"},
+        {std::nanf(""), "holds nan at voxel 1 2 3, which is not a finite"}}) {
     auto grid = filled(CoordBBox(Coord(0), Coord(3)), 0.5F);
     grid->tree().setValue({1, 2, 3}, bad);
-    EXPECT_THAT(planning(write(grid)),
-                ThrowsMessage<DataError>(HasSubstr("thresholds between 0 and 1")));
+    EXPECT_THAT(planning(write(grid)), ThrowsMessage<DataError>(HasSubstr(refusal)));
   }
 }
 

@@ -266,6 +266,9 @@ TEST_F(ResampleTest, GridsThatAreNotUsedAreNamed) {
                   "second grid of that name; csg --union joins what resample makes of each"));
   EXPECT_THAT(made({write({{"a", ball}, {"v", openvdb::Vec3SGrid::create()}})}).warnings,
               ElementsAre("only grid 'a' is used, not 'v' (vec3s)"));
+  EXPECT_THAT(
+      made({write({{"a", ball}, {"v", openvdb::Vec3SGrid::create()}}), "--grid", "a"}).warnings,
+      IsEmpty());
 }
 
 template <typename GridT>

@@ -153,6 +153,15 @@ TEST_F(Frames, FramesOfAnotherRunAreRefused) {
   EXPECT_EQ(outcome(ours.substr(0, a[1]) + ours), mixed);
 }
 
+TEST_F(Frames, FramesThatRunIntoEachOtherAreDamage) {
+  const std::string ours = recorded();
+  const std::string others = recorded("mesh2sdf other.stl");
+  const std::size_t slab = beginnings(ours)[1];
+  EXPECT_EQ(outcome(ours.substr(0, slab + 200) + others + ours.substr(slab + 200)),
+            "the pipe is damaged: its checksum does not match; make it again, and give each run a "
+            "pipe of its own");
+}
+
 TEST_F(Frames, TheIdOfARunDependsOnItAlone) {
   EXPECT_EQ(recorded(), recorded());
   EXPECT_NE(recorded(), recorded("mesh2sdf other.stl"));
