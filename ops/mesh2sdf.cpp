@@ -13,6 +13,7 @@
 #include "ops/kernels/leaf/part_index.h"
 #include "ops/kernels/mesh/enclosure.h"
 #include "ops/kernels/mesh/mesh_measures.h"
+#include "ops/kernels/mesh/mesh_parts.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/solid_mesh.h"
 #include "vdbdither/engine/operator.h"
@@ -34,7 +35,8 @@ class MeshToSdf : public Source {
     options.positionals(
         "mesh", paths_,
         "Mesh files: " + meshFormatNames() +
-            ". Several are printed as one part, and the grid 'part' tells them apart");
+            ". Several, and closed solids of an STL that have names, are printed as one part, and "
+            "the grid 'part' tells them apart");
     target_.declare(options);
     placement_.declare(options, "the mesh");
     options.integer("refine-y", refine_y_, {1, 16}, "Voxels in place of one along y");
@@ -177,11 +179,14 @@ class MeshToSdf : public Source {
   std::vector<Mesh> readMeshes() {
     std::vector<Mesh> meshes;
     for (const std::string& path : paths_) {
-      meshes.push_back(readMesh(path, [this](const std::string& text) { report().warn(text); }));
-      const std::string flat = whyFlat(meshes.back());
-      if (!flat.empty())
-        throw DataError(inQuotes(path) + ": bounds no volume: " + flat +
-                        "; give the surface a thickness in a mesh editor first");
+      Mesh mesh = readMesh(path, [this](const std::string& text) { report().warn(text); });
+      for (Mesh& part : partsOf(std::move(mesh))) {
+        const std::string flat = whyFlat(part);
+        if (!flat.empty())
+          throw DataError(inQuotes(path) + ": bounds no volume: " + flat +
+                          "; give the surface a thickness in a mesh editor first");
+        meshes.push_back(std::move(part));
+      }
     }
     return meshes;
   }

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -241,7 +242,11 @@ class AsciiStlReader {
       file_.warnAtLine(text_.position(),
                        "the file ends without 'endsolid': it may have been cut off");
     }
-    return welder_.take();
+    Mesh mesh = welder_.take();
+    std::set<std::string_view> names;
+    for (const MeshPart& part : parts_) names.insert(part.name);
+    if (names.size() > 1) mesh.parts = std::move(parts_);
+    return mesh;
   }
 
  private:
@@ -273,7 +278,7 @@ class AsciiStlReader {
     } else if (beginsWith(word, "endsolid")) {
       endSolid();
     } else if (beginsWith(word, "solid")) {
-      beginSolid();
+      beginSolid(word.substr(5));
     } else if (beginsRemark(word)) {
       text_.skipLine();
       follows_end_ = false;
@@ -342,6 +347,8 @@ class AsciiStlReader {
   }
 
   void addTriangle() {
+    if (parts_.empty() || parts_.back().name != name_)
+      parts_.push_back({std::string(name_), static_cast<std::uint32_t>(triangles_)});
     if (++triangles_ % triangles_per_look == 0) throwIfInterrupted();
     welder_.addTriangle(corners_);
     corner_count_ = 0;
@@ -358,24 +365,29 @@ class AsciiStlReader {
            " is no keyword of STL; repair the line or export again");
   }
 
-  void beginSolid() {
+  /// `name` is glued to the keyword, or empty.
+  void beginSolid(std::string_view name) {
     if (in_loop_ || corner_count_ > 0) refuse("the loop before is not closed; export it again");
     in_solid_ = true;
-    skipName();
+    const std::string_view rest = readName();
+    name_ = name.empty() ? rest : name;
   }
 
   void endSolid() {
     if (in_loop_ || corner_count_ > 0) refuse("the loop before is not closed; export it again");
     in_solid_ = false;
     in_facet_ = false;
-    skipName();
+    readName();
   }
 
   /// A name, of any words, ends with its line or before a facet.
-  void skipName() {
+  std::string_view readName() {
     TextCursor rest = text_;
     const std::string_view line = rest.line();
     TextCursor name(line);
+    name.skipBlanks();
+    const char* first = name.position();
+    const char* last = first;
     for (;;) {
       name.skipBlanks();
       const char* begin = name.position();
@@ -385,10 +397,12 @@ class AsciiStlReader {
       if (equalsIgnoringCase(word, "facet") && equalsIgnoringCase(facet.word(), "normal") &&
           facet.number()) {
         text_ = TextCursor(all_.substr(static_cast<std::size_t>(begin - all_.data())));
-        return;
+        return {first, last};
       }
+      last = name.position();
     }
     text_ = rest;
+    return {first, last};
   }
 
   static bool isKeyword(std::string_view word) {
@@ -421,6 +435,8 @@ class AsciiStlReader {
   std::array<Vec3d, 3> corners_;
   std::size_t corner_count_ = 0;  ///< of the facet that is not yet a triangle
   std::size_t triangles_ = 0;
+  std::string_view name_;  ///< of the solid
+  std::vector<MeshPart> parts_;
   bool in_solid_ = false;
   bool in_facet_ = false;
   bool in_loop_ = false;

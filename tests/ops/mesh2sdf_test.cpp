@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <regex>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -219,6 +220,18 @@ TEST_F(Mesh2Sdf, GuessesOnlyThoseOfSeveralFilesThatAreLoose) {
   EXPECT_LT(surface->tree().getValue(Coord(15, 22, 62)), 0);
   EXPECT_LT(surface->tree().getValue(Coord(35, 22, 62)), 0);
   EXPECT_NE(part->tree().getValue(Coord(15, 22, 64)), part->tree().getValue(Coord(35, 22, 64)));
+}
+
+TEST_F(Mesh2Sdf, ClosedSolidsOfOneFileAreParts) {
+  const Mesh right = test::boxMesh({4, 2, 3}, {5, 2.5, 3.25});
+  std::ofstream(path_) << test::asciiStl(test::boxMesh({1, 2, 3}, {2, 2.5, 3.25}))
+                       << std::regex_replace(test::asciiStl(right), std::regex("solid part"),
+                                             "solid right");
+  const Schema schema = plan({"--pitch", "0.1,0.1,0.05"});
+  const Grids grids = source().run(schema.lattice.layers());
+  const auto part = openvdb::gridConstPtrCast<openvdb::Int32Grid>(grids.at("part"));
+  EXPECT_EQ(part->tree().getValue(Coord(15, 22, 62)), 1);
+  EXPECT_EQ(part->tree().getValue(Coord(45, 22, 62)), 2);
 }
 
 TEST_F(Mesh2Sdf, RefusesWhatItCannotMean) {

@@ -2,11 +2,18 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include <openvdb/Types.h>
 
 namespace vdbdither {
+
+/// Triangles of a mesh under one name, from `begin` up to those of the next part.
+struct MeshPart {
+  std::string name;
+  std::uint32_t begin = 0;
+};
 
 /// An indexed triangle mesh. Reading makes no promise about it: triangles may be degenerate,
 /// wrongly oriented or open, and vertices need not be shared.
@@ -16,6 +23,9 @@ struct Mesh {
   std::vector<openvdb::Vec3d>
       vertices;                     ///< finite positions; in mm once mesh2sdf has placed the part
   std::vector<Triangle> triangles;  ///< indices into `vertices`, all in range
+  /// In the order of the triangles, where a file names two or more. Only readers set them, and
+  /// `partsOf` reads them: meshes made from others have none.
+  std::vector<MeshPart> parts{};
 };
 
 }  // namespace vdbdither

@@ -177,7 +177,7 @@ TEST(Stl, RefusesCornersThatAreNotFinite) {
             "'part', line 20: vertex is not finite (0.5 nan -inf); repair the mesh");
 }
 
-TEST(Stl, TakesSeveralSolidsAsOneMesh) {
+TEST(Stl, SeveralSolidsShareVertices) {
   const Mesh box = boxMesh({0, 0, 0}, {1, 1, 1});
   Mesh both = box;
   for (const Vec3d& vertex : box.vertices) both.vertices.push_back(vertex + Vec3d(1, 0, 0));
@@ -225,6 +225,28 @@ TEST(Stl, ReadsTextByWordsAndNotByLines) {
     ASSERT_NE(changed, text);
     expectSame(parseQuietly(changed), mesh);
   }
+}
+
+TEST(Stl, SolidsAreNamedParts) {
+  const Mesh mesh = floatPart();
+  const std::string solid = asciiStl(mesh);
+  const auto parts = [](const std::string& text) {
+    std::vector<std::pair<std::string, std::uint32_t>> named;
+    for (const MeshPart& part : parse(text).parts) named.emplace_back(part.name, part.begin);
+    return named;
+  };
+  const auto other = [&](const std::string& start) {
+    return std::regex_replace(solid, std::regex("^solid part"), start);
+  };
+  EXPECT_THAT(parts(solid + solid), testing::IsEmpty());
+  EXPECT_THAT(parts(solid + "solid empty\nendsolid\n"), testing::IsEmpty());
+  EXPECT_THAT(parts(other("solid") + other("solid")), testing::IsEmpty());
+  EXPECT_THAT(parts(solid + other("solid  the other one \t")),
+              ElementsAre(std::pair("part", 0), std::pair("the other one", 80)));
+  EXPECT_THAT(parts(other("SOLIDglued") + other("solid")),
+              ElementsAre(std::pair("glued", 0), std::pair("", 80)));
+  EXPECT_THAT(parts(solid.substr(0, solid.find("endsolid")) + other("solid b")),
+              ElementsAre(std::pair("part", 0), std::pair("b", 80)));
 }
 
 TEST(Stl, WarnsOfTextThatMayBeCutOff) {
