@@ -1,5 +1,6 @@
 // Signs of the distance field against a generalized winding number in double, on the meshes given:
-// mesh_robustness_bench SAMPLES mesh … prints a table in Markdown.
+// mesh_robustness_bench SAMPLES mesh … prints a table in Markdown. mesh_robustness_bench walls
+// prints what it costs to find the walls of many shells.
 
 #include <algorithm>
 #include <cmath>
@@ -19,6 +20,7 @@
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/solid_mesh.h"
 #include "ops/kernels/mesh/winding_number.h"
+#include "tests/bench/mesh_robustness/wall_costs.h"
 
 namespace {
 
@@ -151,6 +153,10 @@ void judge(const std::filesystem::path& path, std::size_t count) {
 }  // namespace
 
 int main(int count, char** arguments) {
+  if (count == 2 && std::string(arguments[1]) == "walls") {
+    printWallCosts();
+    return 0;
+  }
   std::printf(
       "| mesh | triangles | solid of its box | wrong in the band | wrong deep inside | band, "
       "without "

@@ -17,9 +17,9 @@ struct SwallowedWalls {
   std::uint64_t cut = 0;                ///< triangles of which pieces are left
 };
 
-/// The walls of `mesh` (in mm, closed) within its solid, which is where the winding number is not
-/// zero. Triangles that intersect others are cut along the planes of these; the cuts are exact to
-/// rounding. Deterministic.
+/// Returns the walls of `mesh` (in mm, closed) within its solid, which is where the winding number
+/// is not zero. Triangles that others meet are cut where these pass; the cuts are exact to
+/// rounding. The result is the same for any number of threads. Throws Interrupted.
 SwallowedWalls swallowedWalls(const Mesh& mesh);
 
 }  // namespace vdbdither

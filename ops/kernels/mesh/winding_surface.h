@@ -26,7 +26,7 @@ struct WindingSurface : DerivedMesh {
 /// those thinner than a cell that no longer divides. The surface is cut off at half the longest
 /// side from the triangles' bounding box. The result is the same for any number of threads.
 ///
-/// `triangles` in mm. `progress` receives fractions, from the calling thread.
+/// `triangles` in mm. `progress` receives fractions, from the calling thread. Throws Interrupted.
 WindingSurface windingSurface(const Mesh& triangles,
                               const std::function<void(double)>& progress = {},
                               std::size_t max_leaves = 3'000'000);

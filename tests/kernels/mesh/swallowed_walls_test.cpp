@@ -1,15 +1,11 @@
 #include "ops/kernels/mesh/swallowed_walls.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <csignal>
-#include <cstdlib>
 #include <limits>
 #include <numbers>
 #include <random>
-#include <thread>
 
 #include <gtest/gtest.h>
 #include <openvdb/math/BBox.h>
@@ -19,8 +15,8 @@
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/mesh_repair.h"
 #include "ops/kernels/mesh/winding_number.h"
+#include "tests/support/interrupted_work.h"
 #include "tests/support/shapes.h"
-#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 namespace {
@@ -347,45 +343,25 @@ TEST(SwallowedWalls, AreTheSameForAnyNumberOfThreads) {
   EXPECT_GT(many.cut, 0U);
 }
 
-/// Ends the process with 1 if `work` ends before a signal that comes after `delay`, or long after
-/// it, and with 0 if it throws Interrupted.
-template <class Work>
-[[noreturn]] void endByInterrupt(std::chrono::milliseconds delay, const Work& work) {
-  noteInterrupts();
-  std::atomic<std::chrono::steady_clock::time_point> sent{};
-  std::thread sender([&] {
-    std::this_thread::sleep_for(delay);
-    sent = std::chrono::steady_clock::now();
-    std::raise(SIGINT);
-  });
-  try {
-    work();
-  } catch (const Interrupted&) {
-    sender.join();
-    std::_Exit(std::chrono::steady_clock::now() - sent.load() < std::chrono::seconds(10) ? 0 : 1);
-  }
-  std::_Exit(1);
-}
-
 TEST(SwallowedWalls, ASignalEndsTheSearch) {
   testing::GTEST_FLAG(death_test_style) = "threadsafe";
   // Minutes of work, most of it in the search for crossed triangles, or in cutting a few of them.
-  EXPECT_EXIT(endByInterrupt(std::chrono::milliseconds(300),
-                             [] {
-                               swallowedWalls(heapOf(3000, {1, 1, 1}, 0.3));
-                             }),
+  EXPECT_EXIT(test::endByInterrupt(std::chrono::milliseconds(300),
+                                   [] {
+                                     swallowedWalls(heapOf(3000, {1, 1, 1}, 0.3));
+                                   }),
               testing::ExitedWithCode(0), "");
   EXPECT_EXIT(
-      endByInterrupt(std::chrono::milliseconds(1000),
-                     [] {
-                       std::vector<Mesh> parts;
-                       for (int i = 0; i < 2000; ++i) {
-                         const double at = 1e-3 * i;
-                         parts.push_back(test::boxMesh({at, -1, 0}, {at + 1, 9, 0.6 + at}));
-                         parts.push_back(test::boxMesh({-1, at, 0.1}, {9, at + 1, 0.7 + at}));
-                       }
-                       swallowedWalls(joined(std::move(parts)));
-                     }),
+      test::endByInterrupt(std::chrono::milliseconds(1000),
+                           [] {
+                             std::vector<Mesh> parts;
+                             for (int i = 0; i < 2000; ++i) {
+                               const double at = 1e-3 * i;
+                               parts.push_back(test::boxMesh({at, -1, 0}, {at + 1, 9, 0.6 + at}));
+                               parts.push_back(test::boxMesh({-1, at, 0.1}, {9, at + 1, 0.7 + at}));
+                             }
+                             swallowedWalls(joined(std::move(parts)));
+                           }),
       testing::ExitedWithCode(0), "");
 }
 

@@ -8,6 +8,7 @@
 #include <tbb/global_control.h>
 
 #include "ops/kernels/mesh/winding_number.h"
+#include "tests/support/interrupted_work.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/shapes.h"
 
@@ -153,6 +154,25 @@ TEST(WindingSurface, TellsHowFarItIs) {
       },
       few_leaves);
   EXPECT_GT(last, 0.5);
+}
+
+TEST(WindingSurface, ASignalEndsTheGuess) {
+  testing::GTEST_FLAG(death_test_style) = "threadsafe";
+  // Triangles of any direction take all cells, which are many seconds of work.
+  EXPECT_EXIT(test::endByInterrupt(std::chrono::milliseconds(500),
+                                   [] {
+                                     std::mt19937 random(1);
+                                     std::uniform_real_distribution<double> place(0, 10);
+                                     Mesh soup;
+                                     for (std::uint32_t t = 0; t < 300; ++t) {
+                                       for (int corner = 0; corner < 3; ++corner)
+                                         soup.vertices.emplace_back(place(random), place(random),
+                                                                    place(random));
+                                       soup.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+                                     }
+                                     windingSurface(soup);
+                                   }),
+              testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

@@ -1,0 +1,5 @@
+#pragma once
+
+/// Prints a table in Markdown of what it costs to find the walls of many shells: in a row, within
+/// each other, on one plane and in one place.
+void printWallCosts();
