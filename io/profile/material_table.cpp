@@ -97,10 +97,6 @@ MaterialTable materialTableFromJson(const std::string& text) {
     if (entry.value("index", ordered_json()) != table.size() + 1)
       throw refusal("its indices are not 1, 2, 3 …");
     table.push_back({printable(name.get<std::string>()), *rgba});
-    // Slices of one material lie in a folder of its name.
-    const std::string& folder = table.back().name;
-    if (folder.empty() || folder.starts_with('.') || folder.find('/') != std::string::npos)
-      throw refusal("'" + folder + "' cannot be the name of a folder");
   }
   return table;
 }

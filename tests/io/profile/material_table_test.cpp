@@ -52,15 +52,6 @@ TEST(MaterialTable, NamesBecomePrintable) {
             "a\\n\\x1b");
 }
 
-TEST(MaterialTable, ANameThatIsNoFolderIsADataError) {
-  for (const char* name : {"", ".", "..", "../a", "a/b", "/a", ".hidden"}) {
-    const std::string text =
-        R"([{"index":1,"name":")" + std::string(name) + R"(","rgba":[0,0,0,0]}])";
-    EXPECT_THAT([&] { materialTableFromJson(text); },
-                ThrowsMessage<DataError>(HasSubstr("' cannot be the name of a folder")));
-  }
-}
-
 TEST(MaterialTable, NamesAreThePrintersThenTheUsualInks) {
   const std::vector<Material> known = {{"Blue", {1, 2, 3, 255}}, {"white", {9, 9, 9, 255}}};
   EXPECT_THAT(parseMaterial("blue", known).rgba, ElementsAre(1, 2, 3, 255));
