@@ -29,24 +29,20 @@ ordered_json withValidTexts(ordered_json json) {
 
 /// Writes the characters beyond ASCII that are not printable as JSON escapes. The library does so
 /// for those of ASCII only.
-std::string escaped(const std::string& text) {
+std::string escaped(std::string_view text) {
+  constexpr char32_t del = 0x7F;
   std::string result;
   result.reserve(text.size());
-  for (std::size_t at = 0; at < text.size();) {
-    const auto byte = static_cast<unsigned char>(text[at]);
-    const std::size_t size = byte < 0x80 ? 1 : byte < 0xE0 ? 2 : byte < 0xF0 ? 3 : 4;
-    const std::string_view character = std::string_view(text).substr(at, size);
-    at += size;
-    if (byte != 0x7F && (size == 1 || size == 4 || isPrintable(character))) {
-      result += character;
-      continue;
+  while (!text.empty()) {
+    const Utf8Character character = firstCharacter(text);
+    if (character.code != del && (character.size == 1 || isPrintable(character))) {
+      result += text.substr(0, character.size);
+    } else {
+      std::array<char, 16> digits{};
+      std::snprintf(digits.data(), digits.size(), "\\u%04x", static_cast<unsigned>(character.code));
+      result += digits.data();
     }
-    unsigned code = size == 1 ? byte : byte & (0x7FU >> size);
-    for (const char c : character.substr(1))
-      code = code << 6 | (static_cast<unsigned char>(c) & 0x3FU);
-    std::array<char, 8> digits{};
-    std::snprintf(digits.data(), digits.size(), "\\u%04x", code);
-    result += digits.data();
+    text.remove_prefix(character.size);
   }
   return result;
 }

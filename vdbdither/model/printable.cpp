@@ -1,42 +1,42 @@
 #include "vdbdither/model/printable.h"
 
-#include <cstdint>
+#include <algorithm>
+#include <array>
+#include <utility>
 
 namespace vdbdither {
 
-namespace {
-
-/// A character of UTF-8, or a byte that is none.
-struct Character {
-  std::size_t size = 1;
-  bool valid = false;
-  std::uint32_t code = 0;
-};
-
-/// The first character of `text`, which is not empty.
-Character firstOf(std::string_view text) {
+Utf8Character firstCharacter(std::string_view text) {
   const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(text[at]); };
   const unsigned char lead = byte(0);
   if (lead < 0x80) return {1, true, lead};
   const std::size_t size = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
   if (lead < 0xC2 || lead > 0xF4 || text.size() < size) return {};
-  std::uint32_t code = lead & (0x7F >> size);
+  char32_t code = lead & (0x7FU >> size);
   for (std::size_t at = 1; at < size; ++at) {
     if ((byte(at) & 0xC0) != 0x80) return {};
-    code = code << 6 | (byte(at) & 0x3F);
+    code = code << 6 | (byte(at) & 0x3FU);
   }
   const bool overlong = (size == 3 && code < 0x800) || (size == 4 && code < 0x10000);
   if (overlong || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF)) return {};
   return {size, true, code};
 }
 
-bool isPrintable(const Character& c) {
-  if (!c.valid || c.code < 0x20 || (c.code >= 0x7F && c.code < 0xA0)) return false;
-  const bool turns = c.code == 0x061C || c.code == 0x200E || c.code == 0x200F ||
-                     (c.code >= 0x202A && c.code <= 0x202E) ||
-                     (c.code >= 0x2066 && c.code <= 0x2069);
-  return !turns && c.code != 0x2028 && c.code != 0x2029;
+bool isPrintable(const Utf8Character& character) {
+  constexpr std::array<std::pair<char32_t, char32_t>, 8> hidden{{{0x00, 0x1F},
+                                                                 {0x7F, 0x9F},
+                                                                 {0x061C, 0x061C},
+                                                                 {0x200E, 0x200F},
+                                                                 {0x2028, 0x202E},
+                                                                 {0x2066, 0x2069},
+                                                                 {0xFEFF, 0xFEFF},
+                                                                 {0xFFF9, 0xFFFB}}};
+  return character.valid && std::none_of(hidden.begin(), hidden.end(), [&](const auto& range) {
+           return character.code >= range.first && character.code <= range.second;
+         });
 }
+
+namespace {
 
 void appendEscaped(std::string& text, std::string_view bytes) {
   constexpr std::string_view digits = "0123456789abcdef";
@@ -52,7 +52,7 @@ std::string copied(std::string_view text, const Escape& escape) {
   std::string result;
   result.reserve(text.size());
   while (!text.empty()) {
-    const Character c = firstOf(text);
+    const Utf8Character c = firstCharacter(text);
     const std::string_view bytes = text.substr(0, c.size);
     if (!escape(result, c, bytes)) result += bytes;
     text.remove_prefix(c.size);
@@ -64,7 +64,7 @@ std::string copied(std::string_view text, const Escape& escape) {
 
 bool isPrintable(std::string_view text) {
   while (!text.empty()) {
-    const Character c = firstOf(text);
+    const Utf8Character c = firstCharacter(text);
     if (!isPrintable(c)) return false;
     text.remove_prefix(c.size);
   }
@@ -72,7 +72,7 @@ bool isPrintable(std::string_view text) {
 }
 
 std::string printable(std::string_view text) {
-  return copied(text, [](std::string& result, const Character& c, std::string_view bytes) {
+  return copied(text, [](std::string& result, const Utf8Character& c, std::string_view bytes) {
     if (isPrintable(c)) return false;
     if (bytes == "\n") {
       result += "\\n";
@@ -88,7 +88,7 @@ std::string printable(std::string_view text) {
 }
 
 std::string printableLines(std::string_view text) {
-  return copied(text, [](std::string& result, const Character& c, std::string_view bytes) {
+  return copied(text, [](std::string& result, const Utf8Character& c, std::string_view bytes) {
     if (isPrintable(c) || bytes == "\n" || bytes == "\t") return false;
     appendEscaped(result, bytes);
     return true;
@@ -96,7 +96,7 @@ std::string printableLines(std::string_view text) {
 }
 
 std::string validUtf8(std::string_view text) {
-  return copied(text, [](std::string& result, const Character& c, std::string_view bytes) {
+  return copied(text, [](std::string& result, const Utf8Character& c, std::string_view bytes) {
     if (!c.valid) appendEscaped(result, bytes);
     return !c.valid;
   });

@@ -7,8 +7,21 @@ namespace vdbdither {
 
 // Names and texts of files can hold any bytes. What is shown to the user passes through here.
 //
-// A character is printable unless it is a control character, changes the direction of text, or
-// separates lines or paragraphs. A byte that is not part of UTF-8 is not printable.
+// A character is printable unless it is a control character, changes the direction of text,
+// separates lines or paragraphs, or marks bytes or annotations. A byte that is not part of UTF-8 is
+// not printable.
+
+/// A character of UTF-8, or a byte that is no part of it.
+struct Utf8Character {
+  std::size_t size = 1;  ///< in bytes
+  bool valid = false;    ///< well-formed UTF-8 (Unicode 15, table 3-7)
+  char32_t code = 0;
+};
+
+/// The first character of `text`, which must not be empty.
+Utf8Character firstCharacter(std::string_view text);
+
+bool isPrintable(const Utf8Character& character);
 
 /// Whether all characters of `text` are printable.
 bool isPrintable(std::string_view text);

@@ -14,6 +14,8 @@
 
 #include "io/file/staged_output.h"
 #include "vdbdither/model/interrupt.h"
+#include "vdbdither/model/printable.h"
+#include "vdbdither/model/unexpected.h"
 #include "vdbdither/program/threads.h"
 
 namespace vdbdither {
@@ -53,8 +55,10 @@ bool isEnding(int code) {
     message = "out of memory; try a smaller --slab or fewer --layers";
   } catch (const std::system_error& error) {
     message = refusedThread(error.code());
+  } catch (const Error& error) {
+    message = printable(error.what());
   } catch (const std::exception& error) {
-    message = error.what();
+    message = printable(unexpectedText(error));
   } catch (...) {
   }
   claimEnding(1);
