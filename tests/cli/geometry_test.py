@@ -1,6 +1,7 @@
 """Chains with resample, offset, csg and hollow give correct slices in every way to run them."""
 
 import json
+import math
 import shutil
 import subprocess
 import unittest
@@ -37,6 +38,15 @@ class Geometry(ProgramTest):
         whole = "mesh2sdf part.stl --printer mimaki-3duj-553 --band 0.4mm ! offset"
         self.assert_volume(f"{whole} --by 0.2mm", 4.18879 * 1.2 ** 3)
         self.assert_volume(f"{whole} --by -0.2mm", 4.18879 * 0.8 ** 3)
+
+    def test_a_coarse_lattice_is_dithered_within_seconds(self):
+        meshes.write_stl(self.folder / "ball.stl", meshes.turned(meshes.sphere(60, 40), 5, 3))
+        for pitch, radius in (("10mm,10mm,10mm", 60), ("1mm,1mm,1mm", 60), ("0.4mm,0.4mm,0.4mm", 20), ("5mm,0.1mm,5mm", 30)):
+            chain = ("mesh2sdf", "ball.stl", "--scale", radius / 60, "--pitch", pitch, "!", "dither")
+            # All waves that the blur leaves would take minutes.
+            self.succeed(*chain, "-o", "x.vdb", "--explain")
+            told = json.loads(self.succeed(*chain, "!", "stats", "--json"))
+            self.assertAlmostEqual(told["solid"]["ml"] * 1000 / (4 / 3 * math.pi * radius**3), 1, delta=0.05)
 
     def test_a_union_reaches_as_high_as_both_and_keeps_their_materials(self):
         self.box("low.stl", (1, 1, 1), (0, 0, 0.5))
