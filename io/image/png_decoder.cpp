@@ -46,7 +46,7 @@ class Decoder {
     SpansBuilder spans(width);
     std::vector<std::uint8_t> row(png_get_rowbytes(png_, info_));
     for (std::uint32_t y = 0; y < height; ++y) {
-      if (y + 1 == height) allowance_ = 2 * row.size() + 65536;
+      if (y + 1 == height) allowance_ = 2 * row.size() + 16384;
       png_read_row(png_, row.data(), nullptr);
       for (std::uint32_t x = 0; x < width; ++x) {
         std::uint32_t colour = 0;

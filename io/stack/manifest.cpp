@@ -284,7 +284,7 @@ Manifest readManifest(const StackInput& stack, EditedStack edited,
   const std::string shown = "'" + stack.shownManifest() + "'";
   static_cast<void>(parser.list(parser.json(), "slices"));
   checkDigest(parser, shown, edited, warn);
-  const Manifest manifest = manifestOf(parser);
+  Manifest manifest = manifestOf(parser);
   const Lattice& lattice = manifest.lattice;
   for (int axis = 0; axis < 3; ++axis) {
     constexpr double finest_mm = 1e-6;

@@ -139,6 +139,15 @@ TEST(Zip, ADirectoryThatDoesNotHoldWhatItStatesIsDamaged) {
       ThrowsMessage<DataError>(HasSubstr("is damaged: its directory ends after 2 of 200 members")));
 }
 
+TEST(Zip, RefusesVeryManyMembersWhateverTheArchiveStates) {
+  const test::ScratchFolder scratch;
+  ZipWriter writer(scratch / "a.zip", "a.zip");
+  for (int i = 0; i <= 1 << 18; ++i) writer.add(std::to_string(i), {});
+  writer.finish();
+  EXPECT_THAT([&] { ZipReader(scratch / "a.zip"); },
+              ThrowsMessage<DataError>(HasSubstr("its member '262144' is one too many; pack")));
+}
+
 TEST(Zip, IsAnOrdinaryFile) {
   EXPECT_THAT([] { ZipReader("/dev/zero"); },
               ThrowsMessage<DataError>("'/dev/zero' is not an ordinary file"));
