@@ -92,6 +92,11 @@ class Written {
     const std::lock_guard lock(mutex_);
     partials_.erase(keyOf(target));
   }
+  /// Keeps the target, but not its partial path: that one may hold the replaced output now.
+  void forgetPartial(const fs::path& target) {
+    const std::lock_guard lock(mutex_);
+    partials_[keyOf(target)].clear();
+  }
   bool contains(const fs::path& target) {
     const std::lock_guard lock(mutex_);
     return partials_.contains(keyOf(target));
@@ -99,7 +104,8 @@ class Written {
   std::vector<fs::path> partials() {
     const std::lock_guard lock(mutex_);
     std::vector<fs::path> paths;
-    for (const auto& [target, partial] : partials_) paths.push_back(partial);
+    for (const auto& [target, partial] : partials_)
+      if (!partial.empty()) paths.push_back(partial);
     return paths;
   }
 
@@ -308,6 +314,7 @@ void StagedOutput::write(const std::string& name, std::span<const std::uint8_t> 
 void StagedOutput::commit() {
   throwIfInterrupted();
   const std::shared_lock naming(Written::all().naming);
+  Written::all().forgetPartial(target_);
   if (kind_ == Kind::folder) {
     commitFolder();
   } else if (!renamed(partial_, target_)) {

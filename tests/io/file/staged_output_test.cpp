@@ -1,5 +1,6 @@
 #include "io/file/staged_output.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <fcntl.h>
@@ -451,6 +452,30 @@ TEST(StagedOutput, AfterAbandonAllNothingRemainsAndNothingIsCommitted) {
   EXPECT_EQ(status, 0);
   EXPECT_THAT(test::filesUnder(scratch.path()), UnorderedElementsAre(Pair("old", one)));
   EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), {}), 1);
+}
+
+TEST_F(OldStack, KeepsFilesOfOthersWhereTheRunIsAbandonedWhileItIsReplaced) {
+  const pid_t child = fork();
+  if (child == 0) {
+    StagedOutput output(scratch_ / "out", Kind::folder,
+                        [](const fs::path&) -> std::set<std::string> {
+                          std::thread([] {
+                            StagedOutput::abandonAll(std::chrono::milliseconds(10));
+                            _exit(0);
+                          }).join();
+                          return {};
+                        });
+    output.write("new", two);
+    put(scratch_ / "out/notes.txt", one);
+    output.commit();
+    _exit(1);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  const auto files = test::filesUnder(scratch_.path());
+  EXPECT_TRUE(std::any_of(files.begin(), files.end(),
+                          [](const auto& file) { return file.first.ends_with("/notes.txt"); }));
 }
 
 TEST(StagedOutput, RefusesBeforeAnyWork) {
