@@ -143,8 +143,9 @@ std::pair<std::filesystem::path, std::string> readProfile(const std::string& nam
   }
   std::error_code none;
   const std::string shown = "'" + path.string() + "'";
+  if (!std::filesystem::exists(path, none)) throw UsageError("no such printer profile " + shown);
   if (!std::filesystem::is_regular_file(path, none))
-    throw UsageError("no such printer profile " + shown);
+    throw UsageError("the printer profile " + shown + " is not a regular file");
   constexpr std::uint64_t most_bytes = 1 << 20;
   const std::vector<std::uint8_t> bytes = readWholeFile(path, shown, most_bytes);
   return {path, {bytes.begin(), bytes.end()}};

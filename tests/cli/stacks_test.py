@@ -313,7 +313,7 @@ class Stacks(ProgramTest):
 
     def test_a_profile_is_an_ordinary_small_file_with_proper_names(self):
         os.mkfifo(self.folder / "pipe.json")
-        self.refuse(2, "no such printer profile 'pipe.json'", "mesh2sdf", "part.stl", "--printer", "pipe.json", "-o", "x.vdb",
+        self.refuse(2, "the printer profile 'pipe.json' is not a regular file", "mesh2sdf", "part.stl", "--printer", "pipe.json", "-o", "x.vdb",
                     timeout=SECONDS * PATIENCE)
         (self.folder / "large.json").touch()
         os.truncate(self.folder / "large.json", 1 << 40)

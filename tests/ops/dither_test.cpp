@@ -186,7 +186,7 @@ TEST_F(MaskFile, RefusesThresholdsOutsideTheOpenUnitInterval) {
 TEST_F(MaskFile, RefusesThresholdsThatAreNotFinite) {
   auto grid = filled(CoordBBox(Coord(0), Coord(3)), 0.5F);
   grid->tree().setValue({1, 2, 3}, std::nanf(""));
-  EXPECT_THAT(planning(write(grid)), ThrowsMessage<DataError>(HasSubstr("1,2,3")));
+  EXPECT_THAT(planning(write(grid)), ThrowsMessage<DataError>(HasSubstr("nan at voxel 1 2 3")));
 }
 
 TEST_F(MaskFile, RefusesWhatIsNotABoxFromTheOrigin) {

@@ -197,7 +197,9 @@ TEST_F(Mesh2Sdf, RefusesWhatCannotBoundAVolumeByTheNameOfItsFile) {
   flat.triangles.resize(2);
   writeObj(path_, flat);
   EXPECT_EQ(refusal<DataError>({"--pitch", "0.1,0.1,0.05"}),
-            "'" + path_ + "': bounds no volume: it has only 2 triangles with an area, and 4 are needed" + remedy);
+            "'" + path_ +
+                "': bounds no volume: it has only 2 triangles with an area, and 4 are needed" +
+                remedy);
   flat.triangles.insert(flat.triangles.end(), flat.triangles.begin(), flat.triangles.end());
   writeObj(path_, flat);
   EXPECT_EQ(refusal<DataError>({solid, "--pitch", "0.1,0.1,0.05"}),
