@@ -1,12 +1,12 @@
-// A plugin of clang that limits clang-tidy to the declarations of the project. Without it clang-tidy matches every
-// declaration of the headers of the system as well, and then drops what it found there: most of its time.
+// A plugin of clang that limits clang-tidy to the declarations of the project. Without it
+// clang-tidy matches every declaration of the headers of the system as well, and then drops what it
+// found there: most of its time.
 
 #include <clang/AST/ASTConsumer.h>
 #include <clang/AST/ASTContext.h>
 #include <clang/Basic/SourceManager.h>
 #include <clang/Frontend/CompilerInstance.h>
 #include <clang/Frontend/FrontendPluginRegistry.h>
-
 #include <memory>
 #include <string>
 #include <vector>
@@ -29,10 +29,13 @@ class OwnDeclarations : public clang::ASTConsumer {
 
 class OwnDeclarationsAction : public clang::PluginASTAction {
  protected:
-  std::unique_ptr<clang::ASTConsumer> CreateASTConsumer(clang::CompilerInstance&, llvm::StringRef) override {
+  std::unique_ptr<clang::ASTConsumer> CreateASTConsumer(clang::CompilerInstance&,
+                                                        llvm::StringRef) override {
     return std::make_unique<OwnDeclarations>();
   }
-  bool ParseArgs(const clang::CompilerInstance&, const std::vector<std::string>&) override { return true; }
+  bool ParseArgs(const clang::CompilerInstance&, const std::vector<std::string>&) override {
+    return true;
+  }
   ActionType getActionType() override { return AddBeforeMainAction; }
 };
 

@@ -85,8 +85,8 @@ std::string_view FileBytes::all() {
 void FileBytes::readUpTo(std::size_t end) {
   while (read_ < end) {
     throwIfInterrupted();
-    const ssize_t count = ::pread(file_, bytes_ + read_, std::min(end - read_, step_size),
-                                  static_cast<off_t>(read_));
+    const ssize_t count =
+        ::pread(file_, bytes_ + read_, std::min(end - read_, step_size), static_cast<off_t>(read_));
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) refuse("cannot be read: " + reason());
     if (count == 0)

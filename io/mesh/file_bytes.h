@@ -11,8 +11,8 @@ namespace vdbdither {
 /// cuts a mapped file off ends the program.
 class FileBytes {
  public:
-  /// Opens the file and reads its head. Throws DataError where it is no regular file, cannot be read
-  /// or does not fit into memory.
+  /// Opens the file and reads its head. Throws DataError where it is no regular file, cannot be
+  /// read or does not fit into memory.
   explicit FileBytes(std::string path);
   FileBytes(const FileBytes&) = delete;
   FileBytes& operator=(const FileBytes&) = delete;

@@ -27,13 +27,11 @@ class MeshFile {
   [[nodiscard]] std::size_t size() const {
     return file_ != nullptr ? file_->size() : bytes_.size();
   }
-  /// The first bytes, of which `bytes` is a continuation at the same address. What they and the size
-  /// show to be wrong is refused before the file is read.
+  /// The first bytes, of which `bytes` is a continuation at the same address. What they and the
+  /// size show to be wrong is refused before the file is read.
   [[nodiscard]] std::string_view head() const { return bytes_; }
   /// All bytes. The first call reads the file; throws DataError.
-  [[nodiscard]] std::string_view bytes() const {
-    return file_ != nullptr ? file_->all() : bytes_;
-  }
+  [[nodiscard]] std::string_view bytes() const { return file_ != nullptr ? file_->all() : bytes_; }
   /// All bytes without the byte order mark of UTF-8 and without zeros and ^Z at the end, with which
   /// some systems fill up a text. Refuses zeros elsewhere.
   [[nodiscard]] std::string_view text() const;

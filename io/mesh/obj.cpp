@@ -130,8 +130,8 @@ class ObjReader {
     constexpr std::int64_t maximum = 0xFFFFFFFF;
     const auto count = static_cast<std::int64_t>(mesh_.vertices.size());
     if (error != std::errc() || index == 0 || index > maximum || index < -count) {
-      file_.refuseAtLine(line, "face corner " + inQuotes(corner) + " is out of range: " +
-                                   std::to_string(mesh_.vertices.size()) +
+      file_.refuseAtLine(line, "face corner " + inQuotes(corner) +
+                                   " is out of range: " + std::to_string(mesh_.vertices.size()) +
                                    " vertices so far, counted from 1; export it again");
     }
     return static_cast<std::uint32_t>(index > 0 ? index - 1 : index + count);

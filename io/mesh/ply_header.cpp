@@ -70,8 +70,8 @@ class HeaderParser {
     }
     if (!has_format) refuse("the header has no 'format'; export it again");
     text_.skipBlanks();
-    header_.body = std::min(static_cast<std::size_t>(text_.position() - bytes_.data()) + 1,
-                            file_.size());
+    header_.body =
+        std::min(static_cast<std::size_t>(text_.position() - bytes_.data()) + 1, file_.size());
     refuseCountsBeyondTheFile();
     if (header_.encoding != PlyEncoding::kAscii) findBody();
     return std::move(header_);
@@ -133,15 +133,15 @@ class HeaderParser {
 
   [[nodiscard]] PlyScalar parseScalar(std::string_view name) const {
     constexpr std::array<std::array<std::string_view, 2>, 10> names{{{"char", "int8"},
-                                                                    {"uchar", "uint8"},
-                                                                    {"short", "int16"},
-                                                                    {"ushort", "uint16"},
-                                                                    {"int", "int32"},
-                                                                    {"uint", "uint32"},
-                                                                    {"int64", "int64"},
-                                                                    {"uint64", "uint64"},
-                                                                    {"float", "float32"},
-                                                                    {"double", "float64"}}};
+                                                                     {"uchar", "uint8"},
+                                                                     {"short", "int16"},
+                                                                     {"ushort", "uint16"},
+                                                                     {"int", "int32"},
+                                                                     {"uint", "uint32"},
+                                                                     {"int64", "int64"},
+                                                                     {"uint64", "uint64"},
+                                                                     {"float", "float32"},
+                                                                     {"double", "float64"}}};
     for (std::size_t type = 0; type < names.size(); ++type) {
       if (name == names[type][0] || name == names[type][1]) return static_cast<PlyScalar>(type);
     }

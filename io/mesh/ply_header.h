@@ -59,8 +59,8 @@ struct PlyHeader {
   std::size_t body = 0;  ///< where it begins in the file
 };
 
-/// Parses the header of a PLY file. Refuses what is wrong with it, and counts that are more than the
-/// file holds before it is read.
+/// Parses the header of a PLY file. Refuses what is wrong with it, and counts that are more than
+/// the file holds before it is read.
 PlyHeader parsePlyHeader(const MeshFile& file);
 
 }  // namespace vdbdither

@@ -406,12 +406,11 @@ class AsciiStlReader {
   }
 
   static bool isKeyword(std::string_view word) {
-    constexpr std::array<std::string_view, 6> keywords{"vertex", "endloop", "outer",
+    constexpr std::array<std::string_view, 6> keywords{"vertex", "endloop",  "outer",
                                                        "facet",  "endfacet", "end"};
     return beginsWith(word, "endsolid") ||
-           std::any_of(keywords.begin(), keywords.end(), [&](std::string_view keyword) {
-             return equalsIgnoringCase(word, keyword);
-           });
+           std::any_of(keywords.begin(), keywords.end(),
+                       [&](std::string_view keyword) { return equalsIgnoringCase(word, keyword); });
   }
 
   [[noreturn]] void refuseNumbers() const {

@@ -34,8 +34,8 @@ class FrameWriter {
 /// layers.
 class FrameReader {
  public:
-  /// `where` names the pipe in messages. Throws DataError for anything that is not a VDB stream, and
-  /// for a single archive that is followed by more bytes.
+  /// `where` names the pipe in messages. Throws DataError for anything that is not a VDB stream,
+  /// and for a single archive that is followed by more bytes.
   FrameReader(int descriptor, const std::string& where);
 
   /// Throws DataError if the grids do not lie on one lattice, or `checkGrids` refuses them.

@@ -1,7 +1,7 @@
 #include "vdbdither/model/openvdb.h"
 
-// libopenvdb.so lacks the members that its own compiler put in line everywhere. What another compiler puts in line differs
-// with its options and the size of a source.
+// libopenvdb.so lacks the members that its own compiler put in line everywhere. What another
+// compiler puts in line differs with its options and the size of a source.
 #define VDBDITHER_GRID(GridT)                                                 \
   template class openvdb::tree::Tree<openvdb::GridT::TreeType::RootNodeType>; \
   template class openvdb::Grid<openvdb::GridT::TreeType>;

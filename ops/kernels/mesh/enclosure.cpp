@@ -100,8 +100,8 @@ double shareOf(const Mesh& given, const Mesh& mesh) {
 }  // namespace
 
 std::string whyFlat(const Mesh& mesh) {
-  const auto count = std::count_if(
-      mesh.triangles.begin(), mesh.triangles.end(), [&](const Mesh::Triangle& t) {
+  const auto count =
+      std::count_if(mesh.triangles.begin(), mesh.triangles.end(), [&](const Mesh::Triangle& t) {
         const Vec3d& corner = mesh.vertices[t[0]];
         return !(mesh.vertices[t[1]] - corner).cross(mesh.vertices[t[2]] - corner).isZero();
       });
@@ -138,8 +138,8 @@ std::string Enclosure::text(std::size_t holes) const {
     return std::string(digits.begin(), end) + " mm2";
   };
   return std::string(is_one_sided ? "they are one-sided, as a Moebius strip is, and " : "") +
-         counted(holes, "hole") + " would be filled with " + rounded(filling_mm2) +
-         " beside " + rounded(given_mm2) + " of surface";
+         counted(holes, "hole") + " would be filled with " + rounded(filling_mm2) + " beside " +
+         rounded(given_mm2) + " of surface";
 }
 
 Enclosure enclosureOf(const Mesh& mesh, std::size_t fillings) {

@@ -14,8 +14,8 @@ std::string whyFlat(const Mesh& mesh);
 
 /// What fillings of holes are to the solid that they close.
 struct Enclosure {
-  double given_mm2 = 0;    ///< area of the triangles that were given
-  double filling_mm2 = 0;  ///< area of those that fill holes
+  double given_mm2 = 0;       ///< area of the triangles that were given
+  double filling_mm2 = 0;     ///< area of those that fill holes
   bool is_one_sided = false;  ///< like a Möbius strip: neighbours cannot be turned to agree
   /// How much of the winding number inside comes from the triangles given, on average: 1 for a
   /// closed mesh, about 0.7 for a hemisphere or a tube as long as wide, ½ and less for sheets.

@@ -52,9 +52,11 @@ TEST(FileBytes, RefusesAFileThatIsCutOffWhileItIsRead) {
     FileBytes file(path.string());
     std::filesystem::resize_file(path, size);
     EXPECT_THAT([&] { file.all(); },
-                ThrowsMessage<DataError>("'" + path.string() + "': was cut off while it was read, at "
-                                         "byte " + std::to_string(std::max(size, head_size)) +
-                                         " of " + std::to_string(longText().size()) +
+                ThrowsMessage<DataError>("'" + path.string() +
+                                         "': was cut off while it was read, at "
+                                         "byte " +
+                                         std::to_string(std::max(size, head_size)) + " of " +
+                                         std::to_string(longText().size()) +
                                          "; try again once it is complete"));
   }
 }
@@ -62,8 +64,8 @@ TEST(FileBytes, RefusesAFileThatIsCutOffWhileItIsRead) {
 TEST(FileBytes, RefusesAFileThatIsWrittenToWhileItIsRead) {
   const ScratchFolder folder;
   const auto path = folder.write("part.stl", longText());
-  const auto changed = "'" + path.string() +
-                       "': was written to while it was read; try again once it is complete";
+  const auto changed =
+      "'" + path.string() + "': was written to while it was read; try again once it is complete";
   FileBytes longer(path.string());
   std::ofstream(path, std::ios::app) << "more";
   EXPECT_THAT([&] { longer.all(); }, ThrowsMessage<DataError>(changed));
@@ -79,8 +81,9 @@ TEST(FileBytes, AFileLargerThanMemoryIsRefused) {
   std::filesystem::resize_file(path, std::uintmax_t{1} << 42);
   FileBytes file(path.string());
   EXPECT_EQ(file.head().substr(0, 6), std::string_view("solid\0", 6));
-  EXPECT_THAT([&] { file.all(); },
-              ThrowsMessage<DataError>(HasSubstr("its 4398046511104 bytes do not fit into memory")));
+  EXPECT_THAT(
+      [&] { file.all(); },
+      ThrowsMessage<DataError>(HasSubstr("its 4398046511104 bytes do not fit into memory")));
 }
 
 }  // namespace

@@ -169,8 +169,9 @@ TEST(MeshReader, RefusesWhatAHeaderShowsToBeWrongBeforeItReadsTheFile) {
   constexpr std::uintmax_t size = std::uintmax_t{1} << 35;
   const ScratchFolder folder;
   const std::string box = binaryStl(boxMesh({0, 0, 0}, {1, 1, 1}));
-  const std::string ply = "ply\nformat binary_little_endian 1.0\nelement vertex 4294967294\n"
-                          "property double x\nproperty double y\nproperty double z\nend_header\n";
+  const std::string ply =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 4294967294\n"
+      "property double x\nproperty double y\nproperty double z\nend_header\n";
   const std::string counts = " triangles, which are not what its 34359738368 bytes hold";
   for (const auto& [begin, why] : std::map<std::string, std::string>{
            {"", "holds no triangles but zeros, as far as 65536 bytes tell"},

@@ -11,9 +11,10 @@ using testing::ElementsAre;
 
 TEST(Obj, UnderstandsEveryFormOfACorner) {
   const std::string vertices = "v 0 0 0 1\nv 1 0 0 0.5 0.5 0.5\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
-  for (const char* face : {"f 1 2 3", "f 1/1 2/1 3/1", "f 1//1 2//1 3//1", "f 1/1/1 2/1/1 3/1/1",
-                           "f -3 -2 -1", "f -3/-1/-1 2/1 3", "f 1 \\\n 2\\\n 3", "f\t1\t2\t3\t",
-                           "f 1 2 3 # a face", "f 1 2 3#\\", "f 1 2 \\  \n3", "f 1/ 2// 3/\r", "fo 1 2 3"}) {
+  for (const char* face :
+       {"f 1 2 3", "f 1/1 2/1 3/1", "f 1//1 2//1 3//1", "f 1/1/1 2/1/1 3/1/1", "f -3 -2 -1",
+        "f -3/-1/-1 2/1 3", "f 1 \\\n 2\\\n 3", "f\t1\t2\t3\t", "f 1 2 3 # a face", "f 1 2 3#\\",
+        "f 1 2 \\  \n3", "f 1/ 2// 3/\r", "fo 1 2 3"}) {
     SCOPED_TRACE(face);
     const Mesh mesh = parseQuietly(vertices + face);
     EXPECT_THAT(mesh.triangles, ElementsAre(Mesh::Triangle{0, 1, 2}));

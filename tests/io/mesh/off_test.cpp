@@ -50,8 +50,7 @@ TEST(Off, CutsPolygonsIntoTriangles) {
   EXPECT_EQ(cube.triangles[1], (Mesh::Triangle{0, 3, 2}));
 }
 
-const std::string tetrahedron =
-    "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+const std::string tetrahedron = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
 
 TEST(Off, ReadsByWordsWhereLinesAreNoElements) {
   const Mesh mesh = parseQuietly("OFF\n4 4 6\n" + tetrahedron);

@@ -131,7 +131,8 @@ TEST(Ply, CommentsMayStandInTheBody) {
   for (const char* remark : {"comment 3 0 1 2", "obj_info x", "# faces"})
     expectSame(parseQuietly(changed("\n(3 [^\n]*)", "\n" + std::string(remark) + "\n$1")),
                floatPart());
-  expectSame(parseQuietly(plyFile(floatPart(), PlyEncoding::kAscii) + "comment end\n"), floatPart());
+  expectSame(parseQuietly(plyFile(floatPart(), PlyEncoding::kAscii) + "comment end\n"),
+             floatPart());
 }
 
 TEST(Ply, ReadsTextByWordsWhereLinesAreNoElements) {
@@ -151,8 +152,8 @@ TEST(Ply, TheBodyTellsWhichLineEndEndsTheHeader) {
     const std::string header = bytes.substr(0, body - 11);
     for (const char* lines : {"\n", "\r\n", "\r"}) {
       for (const char* last : {"\n", "\r\n", "\r"}) {
-        expectSame(parseQuietly(std::regex_replace(header, std::regex("\n"), lines) +
-                                "end_header" + last + bytes.substr(body)),
+        expectSame(parseQuietly(std::regex_replace(header, std::regex("\n"), lines) + "end_header" +
+                                last + bytes.substr(body)),
                    mesh);
       }
     }
@@ -171,8 +172,7 @@ TEST(Ply, BytesBehindAnOpenMeshMeanThatItWasMisread) {
   }
   // A colour that the header does not declare.
   std::string bytes = plyFile(open, PlyEncoding::kLittleEndian);
-  for (std::size_t face = 11; face > 0; --face)
-    bytes.insert(bytes.size() - 13 * (face - 1), "abc");
+  for (std::size_t face = 11; face > 0; --face) bytes.insert(bytes.size() - 13 * (face - 1), "abc");
   EXPECT_NE(refusal(bytes), "read");
 }
 

@@ -147,7 +147,8 @@ TEST(Stl, BytesBehindAnOpenMeshMeanThatItWasMisread) {
     longer += bytes.substr(84 + 50 * i, 50) + "xy";
   EXPECT_THAT(refusal(longer, "part.stl"), HasSubstr("do not close"));
   EXPECT_THAT(refusal(bytes + std::string(50, 'x'), "part.stl"), HasSubstr("do not close"));
-  for (const std::string& blank : {std::string("\r\n"), std::string(130, '\0'), std::string("\x1A")})
+  for (const std::string& blank :
+       {std::string("\r\n"), std::string(130, '\0'), std::string("\x1A")})
     EXPECT_EQ(parse(bytes + blank, nullptr, "part.stl").triangles, open.triangles);
 }
 

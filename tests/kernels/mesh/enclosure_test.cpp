@@ -25,8 +25,9 @@ using testing::HasSubstr;
 
 /// A grid of `columns` × `rows` cells, its corners at `at` of fractions from 0 to 1. Columns
 /// that close join their ends, and the last is twisted if `twisted`.
-Mesh sheet(std::uint32_t columns, std::uint32_t rows, const std::function<Vec3d(double, double)>& at,
-           bool closes = false, bool twisted = false) {
+Mesh sheet(std::uint32_t columns, std::uint32_t rows,
+           const std::function<Vec3d(double, double)>& at, bool closes = false,
+           bool twisted = false) {
   Mesh mesh;
   for (std::uint32_t i = 0; i <= columns - closes; ++i)
     for (std::uint32_t j = 0; j <= rows; ++j)

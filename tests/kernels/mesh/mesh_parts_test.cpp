@@ -38,9 +38,9 @@ TEST(MeshParts, ClosedPartsAreMeshesOfTheirOwn) {
 }
 
 TEST(MeshParts, PatchesAndRepeatedNamesAreOneMesh) {
-  for (const Mesh& mesh : {named({}), named({{"left", 0}, {"right", 11}}),
-                           named({{"a", 0}, {"b", 2}, {"c", 12}}),
-                           named({{"a", 0}, {"b", 12}, {"a", 24}})}) {
+  for (const Mesh& mesh :
+       {named({}), named({{"left", 0}, {"right", 11}}), named({{"a", 0}, {"b", 2}, {"c", 12}}),
+        named({{"a", 0}, {"b", 12}, {"a", 24}})}) {
     const std::vector<Mesh> parts = partsOf(mesh);
     ASSERT_THAT(parts, SizeIs(1));
     EXPECT_EQ(parts[0].vertices, mesh.vertices);
