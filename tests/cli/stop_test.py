@@ -205,11 +205,9 @@ class Signals(ProgramTest):
         self.assertEqual((process.returncode, said), (143, "vdbdither: stopped: Terminated\n"))
         self.assertEqual(self.listing(), before)
 
-    def test_a_run_that_waits_to_open_a_file_can_be_stopped(self):
-        for name in ("pipe.json", "pipe.vdb"):
-            os.mkfifo(self.folder / name)
-        for arguments in (("printers", "check", "pipe.json"), ("mesh2sdf", "part.stl", "--printer", "pipe.json", "-o", "out.vdb"),
-                          ("info", "pipe.vdb"), ("compare", "pipe.vdb", "pipe.vdb")):
+    def test_a_run_that_waits_for_a_named_pipe_can_be_stopped(self):
+        os.mkfifo(self.folder / "pipe.vdb")
+        for arguments in (("info", "pipe.vdb"), ("compare", "pipe.vdb", "pipe.vdb")):
             before = self.listing()
             process = start_program(self, *arguments)
             time.sleep(0.2)
