@@ -205,7 +205,7 @@ class Signals(ProgramTest):
         self.assertEqual((process.returncode, said), (143, "vdbdither: stopped: Terminated\n"))
         self.assertEqual(self.listing(), before)
 
-    def test_a_run_that_waits_to_open_a_file_can_be_stopped(self):
+    def test_a_run_that_waits_for_a_named_pipe_can_be_stopped(self):
         os.mkfifo(self.folder / "pipe.vdb")
         for arguments in (("info", "pipe.vdb"), ("compare", "pipe.vdb", "pipe.vdb")):
             before = self.listing()
