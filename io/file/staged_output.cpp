@@ -358,30 +358,31 @@ void StagedOutput::keepBeside(int error) {
                   std::generic_category().message(error) + "; the new one is " + quoted(kept));
 }
 
-/// Deletes the own files of the folder that was replaced, and moves others to where they were.
+/// Moves files of others from the folder that was replaced to where they were, then deletes it.
+/// They are moved first: what remains if the process is killed is the program's own.
 void StagedOutput::retire(const fs::path& old) const {
   std::error_code ignored;
+  std::set<std::string> own;
   try {
-    if (own_) {
-      for (const std::string& name : own_(old)) fs::remove(old / name, ignored);
-    }
+    if (own_) own = own_(old);
   } catch (const Error&) {
-    // Nobody knows any more which files these are, so all of them stay.
+    // It cannot be known any more which files these are, so all of them stay.
   }
   std::vector<fs::path> folders{old};
   for (const fs::directory_entry& entry : entriesBelow(old)) {
+    const fs::path name = entry.path().lexically_relative(old);
     if (isFolder(entry)) {
       folders.push_back(entry.path());
-      continue;
+    } else if (!own.contains(name.string()) && !isThere(target_ / name)) {
+      fs::create_directories((target_ / name).parent_path(), ignored);
+      fs::rename(entry.path(), target_ / name, ignored);
     }
-    const fs::path stays = target_ / entry.path().lexically_relative(old);
-    if (isThere(stays)) {
-      // The new output has a file of this name, which replaces it.
+  }
+  for (const fs::directory_entry& entry : entriesBelow(old)) {
+    // Own files, and those that a file of the new output replaces.
+    const fs::path name = entry.path().lexically_relative(old);
+    if (!isFolder(entry) && (own.contains(name.string()) || isThere(target_ / name)))
       fs::remove(entry.path(), ignored);
-    } else {
-      fs::create_directories(stays.parent_path(), ignored);
-      fs::rename(entry.path(), stays, ignored);
-    }
   }
   std::reverse(folders.begin(), folders.end());
   for (const fs::path& folder : folders) fs::remove(folder, ignored);
