@@ -5,6 +5,11 @@
 namespace vdbdither {
 namespace {
 
+TEST(Lattice, WithoutVoxelsHasNoLayers) {
+  EXPECT_EQ(Lattice{}.layers(), (ZRange{0, 0}));
+  EXPECT_EQ((Lattice{{1, 1, 1}, {0, 0, 0}, openvdb::CoordBBox()}).layers().size(), 0);
+}
+
 TEST(Lattice, AlignsRangesOutwardsToLeavesAlsoBelowZero) {
   EXPECT_EQ(alignedToLeaves({-3, 5}), (ZRange{-8, 8}));
   EXPECT_EQ(alignedToLeaves({8, 16}), (ZRange{8, 16}));

@@ -45,7 +45,10 @@ struct Lattice {
   [[nodiscard]] openvdb::Vec3d position(const openvdb::Coord& ijk) const {
     return origin_mm + ijk.asVec3d() * pitch_mm;
   }
-  [[nodiscard]] ZRange layers() const { return {box.min().z(), box.max().z() + 1}; }
+  [[nodiscard]] ZRange layers() const {
+    // The empty box of OpenVDB has the least and the greatest integers as its corners.
+    return box.min().z() > box.max().z() ? ZRange{} : ZRange{box.min().z(), box.max().z() + 1};
+  }
   /// Length of a voxel's diagonal, mm: the largest voxel diameter along any direction.
   [[nodiscard]] double diagonalMm() const { return pitch_mm.length(); }
   friend bool operator==(const Lattice&, const Lattice&) = default;
