@@ -118,9 +118,22 @@ void weldBorders(DerivedMesh& made, MeshRepairs& repairs) {
   if (repairs.welded_vertices > 0) renumber(made, to, repairs);
 }
 
+/// Whether an opposite side meets every side.
+bool isClosed(const Mesh& mesh) { return bordersOf(mesh, MeshEdges(mesh)).empty(); }
+
+/// `mesh` without the triangles to drop.
+Mesh remaining(const Mesh& mesh, const std::vector<bool>& drop) {
+  Mesh rest;
+  rest.vertices = mesh.vertices;
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i)
+    if (!drop[i]) rest.triangles.push_back(mesh.triangles[i]);
+  return rest;
+}
+
 /// Of triangles with the same corners one stays. Two that face opposite ways are a wall between two
 /// solids; both are dropped, unless most of the mesh consists of such pairs: then it is a two-sided
-/// surface, and one of each pair stays.
+/// surface, and one of each pair stays. Where shells that are closed on their own share triangles,
+/// but not all, dropping one would open both: then all that do not cancel stay.
 void dropDuplicates(DerivedMesh& made, MeshRepairs& repairs) {
   const Mesh& mesh = made.mesh;
   struct Corners {
@@ -142,6 +155,7 @@ void dropDuplicates(DerivedMesh& made, MeshRepairs& repairs) {
   });
   std::vector<bool> drop(mesh.triangles.size(), false);
   std::vector<std::uint32_t> walls;
+  std::vector<std::uint32_t> others;  // that face the way of the one that stays, and do not cancel
   for (auto begin = all.begin(); begin != all.end();) {
     const auto end =
         std::find_if(begin, all.end(), [&](const Corners& c) { return c.sorted != begin->sorted; });
@@ -151,10 +165,19 @@ void dropDuplicates(DerivedMesh& made, MeshRepairs& repairs) {
         begin, end, [&](const Corners& c) { return even == odd || c.even == (even > odd); });
     for (auto it = begin; it != end; ++it) drop[it->triangle] = it != stays;
     if (even == odd) walls.push_back(stays->triangle);
+    auto left = std::abs(even - odd) - 1;
+    for (auto it = stays; left > 0 && ++it != end;) {
+      if (it->even != stays->even) continue;
+      others.push_back(it->triangle);
+      --left;
+    }
     begin = end;
   }
-  if (4 * walls.size() < mesh.triangles.size())
+  if (4 * walls.size() < mesh.triangles.size()) {
     for (const std::uint32_t wall : walls) drop[wall] = true;
+    if (!others.empty() && isClosed(mesh) && !isClosed(remaining(mesh, drop)))
+      for (const std::uint32_t other : others) drop[other] = false;
+  }
   const std::size_t before = drop.size();
   dropTriangles(made, [&drop](std::uint32_t i) { return drop[i]; });
   repairs.duplicate_triangles += before - mesh.triangles.size();
@@ -206,6 +229,29 @@ std::vector<std::uint32_t> orient(Mesh& mesh, MeshRepairs& repairs) {
   return part;
 }
 
+/// Returns for every part whether turning it would open sides that others meet: where shells share
+/// a face but not its triangles, the face is a part of its own, which has no inside.
+std::vector<bool> boundParts(const Mesh& mesh, const std::vector<std::uint32_t>& part,
+                             std::size_t count) {
+  std::vector<bool> bound(count, false);
+  const MeshEdges edges(mesh);
+  std::map<std::uint32_t, int> surplus;  // of each part at an edge
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    if (edges.halves(e).size() < 3) continue;
+    surplus.clear();
+    int sum = 0;
+    for (const std::uint32_t half : edges.halves(e)) {
+      const int way = mesh.triangles[half / 3][half % 3] == edges[e].from ? 1 : -1;
+      surplus[part[half / 3]] += way;
+      sum += way;
+    }
+    if (sum != 0) continue;
+    for (const auto& [some, own] : surplus)
+      if (own != 0) bound[some] = true;
+  }
+  return bound;
+}
+
 /// Turns the parts of negative volume that no other part surrounds.
 void turnInsideOut(Mesh& mesh, const std::vector<std::uint32_t>& part, MeshRepairs& repairs) {
   struct Part {
@@ -224,8 +270,12 @@ void turnInsideOut(Mesh& mesh, const std::vector<std::uint32_t>& part, MeshRepai
     for (const std::uint32_t i : own.triangles)
       own.volume += volumeFrom(centre, mesh, mesh.triangles[i]);
   }
+  const bool any =
+      std::any_of(parts.begin(), parts.end(), [](const Part& own) { return own.volume < 0; });
+  const std::vector<bool> bound =
+      any ? boundParts(mesh, part, parts.size()) : std::vector<bool>(parts.size(), false);
   for (const Part& own : parts) {
-    if (!(own.volume < 0)) continue;
+    if (!(own.volume < 0) || bound[static_cast<std::size_t>(&own - parts.data())]) continue;
     const Triangle& first = mesh.triangles[own.triangles.front()];
     const Vec3d p =
         (mesh.vertices[first[0]] + mesh.vertices[first[1]] + mesh.vertices[first[2]]) / 3;

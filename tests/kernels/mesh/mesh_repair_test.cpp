@@ -1,5 +1,6 @@
 #include "ops/kernels/mesh/mesh_repair.h"
 
+#include <algorithm>
 #include <random>
 #include <utility>
 
@@ -135,6 +136,50 @@ TEST(MeshRepair, AWallBetweenTwoSolidsGoes) {
   const Mesh after = repaired(mesh, repairs);
   EXPECT_EQ(openSides(after), 0U);
   EXPECT_NEAR(volumeOf(after), volumeOf(sphereMesh({0, 0, 0}, 1, 8)) + 2, 1e-9);
+}
+
+/// A box whose diagonals are those that the bits of `others` tell, one bit for each face.
+Mesh boxWithDiagonals(unsigned others) {
+  Mesh box = boxMesh({0, 0, 0}, {2, 2, 2});
+  for (std::size_t face = 0; face < 6; ++face) {
+    if ((others >> face & 1) == 0) continue;
+    Mesh::Triangle& first = box.triangles[2 * face];
+    Mesh::Triangle& second = box.triangles[2 * face + 1];
+    // Turned so that both begin behind the diagonal: (a, b, c) and (d, c, b) become (a, b, d), (a,
+    // d, c).
+    for (int turn = 0; turn < 3; ++turn) {
+      if (std::find(second.begin(), second.end(), first[0]) == second.end()) break;
+      std::rotate(first.begin(), first.begin() + 1, first.end());
+    }
+    for (int turn = 0; turn < 3; ++turn) {
+      if (std::find(first.begin(), first.end(), second[0]) == first.end()) break;
+      std::rotate(second.begin(), second.begin() + 1, second.end());
+    }
+    const Mesh::Triangle a = first;
+    const std::uint32_t d = second[0];
+    first = {a[0], a[1], d};
+    second = {a[0], d, a[2]};
+  }
+  return box;
+}
+
+TEST(MeshRepair, ShellsThatShareFacesButNotTheirTrianglesStayClosed) {
+  for (unsigned others = 1; others < 64; ++others) {
+    Mesh both = boxWithDiagonals(0);
+    const Mesh second = boxWithDiagonals(others);
+    both.triangles.insert(both.triangles.end(), second.triangles.begin(), second.triangles.end());
+    // Tilted, the volumes of flat faces are rounding noise.
+    for (Vec3d& v : both.vertices)
+      v = {0.8 * v.x() - 0.6 * v.y(), 0.48 * v.x() + 0.64 * v.y() - 0.6 * v.z(),
+           0.36 * v.x() + 0.48 * v.y() + 0.8 * v.z()};
+    MeshRepairs repairs;
+    const Mesh after = repaired(both, repairs);
+    EXPECT_EQ(openSides(after), 0U) << others;
+    EXPECT_EQ(repairs.turned_parts, 0U) << others;
+    EXPECT_EQ(repairs.boundary_edges, 0U) << others;
+    EXPECT_EQ(repairs.closed_holes, 0U) << others;
+    EXPECT_NEAR(volumeOf(after), 16, 1e-9) << others;
+  }
 }
 
 TEST(MeshRepair, RandomTrianglesBecomeACycle) {
