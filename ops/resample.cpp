@@ -50,7 +50,7 @@ bool isOfVoxels(const GridBase& grid) {
 template <typename GridT>
 FloatGrid::Ptr fogOf(const GridT& grid) {
   using ValueT = typename GridT::ValueType;
-  const auto fog = FloatGrid::create(
+  auto fog = FloatGrid::create(
       std::make_shared<openvdb::FloatTree>(grid.tree(), 0.0F, 1.0F, openvdb::TopologyCopy()));
   if constexpr (!std::is_same_v<GridT, openvdb::MaskGrid>) {
     openvdb::CoordBBox box;

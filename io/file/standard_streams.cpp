@@ -1,6 +1,7 @@
 #include "io/file/standard_streams.h"
 
 #include <cerrno>
+#include <cstring>
 #include <fcntl.h>
 #include <poll.h>
 #include <string>

@@ -84,6 +84,8 @@ int dominantAxis(const Vector& n) {
 /// machine.
 double squaredSine(double x) {
   const double turn = std::abs(x);
+  // Half a turn may go either way: the square is the same.
+  // NOLINTNEXTLINE(bugprone-incorrect-roundings)
   const double a = pi * (turn - static_cast<double>(static_cast<std::int64_t>(turn + 0.5)));
   const double a2 = a * a;
   const double sine =
