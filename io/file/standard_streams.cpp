@@ -3,12 +3,11 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
-#include <poll.h>
 #include <string>
 #include <unistd.h>
 
+#include "io/file/descriptor_wait.h"
 #include "vdbdither/model/errors.h"
-#include "vdbdither/model/interrupt.h"
 #include "vdbdither/model/printable.h"
 
 namespace vdbdither {
@@ -35,17 +34,6 @@ void setStandardOutputAside() {
 }
 
 int dataOutput() { return data_descriptor; }
-
-void waitForOutput(int descriptor) {
-  // A signal may arrive just before the wait begins, or in another thread.
-  constexpr int look_again_milliseconds = 100;
-  pollfd wanted{descriptor, POLLOUT, 0};
-  int ready = 0;
-  do {
-    throwIfInterrupted();
-    ready = ::poll(&wanted, 1, look_again_milliseconds);
-  } while (ready == 0 || (ready < 0 && errno == EINTR));
-}
 
 void printData(const char* given) {
   const std::string shown = printableLines(given);

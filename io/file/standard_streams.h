@@ -14,9 +14,6 @@ void setStandardOutputAside();
 /// The descriptor of the real standard output.
 int dataOutput();
 
-/// Waits until a descriptor that does not block takes data again. Throws Interrupted.
-void waitForOutput(int descriptor);
-
 /// Writes all of a text to the real standard output, in the form of `printableLines`. Throws
 /// DataError.
 void printData(const char* given);

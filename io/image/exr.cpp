@@ -192,7 +192,7 @@ SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& chan
         if (!(row[x] >= 0 && row[x] <= most && row[x] == std::floor(row[x]))) {
           throw DataError("holds " + std::to_string(row[x]) + " in column " + std::to_string(x) +
                           " of row " + std::to_string(y - window.min.y) +
-                          ", which is no index of a material");
+                          ", which is not the index of a material");
         }
         spans.pixel(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(row[x]));
       }

@@ -22,7 +22,7 @@ std::string_view MeshFile::text() const {
   while (!text.empty() && (text.back() == '\0' || text.back() == '\x1A')) text.remove_suffix(1);
   const std::size_t zero = text.find('\0');
   if (zero != std::string_view::npos)
-    refuseAtByte(text.data() + zero, "a zero, so this is no text; export it again");
+    refuseAtByte(text.data() + zero, "a zero, so this is not a text; export it again");
   return text;
 }
 

@@ -65,7 +65,7 @@ class HeaderParser {
       } else if (keyword == "end_header") {
         break;
       } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
-        refuse(inQuotes(keyword) + " is no keyword of a PLY header; export it again");
+        refuse(inQuotes(keyword) + " is not a keyword of a PLY header; export it again");
       }
     }
     if (!has_format) refuse("the header has no 'format'; export it again");

@@ -283,7 +283,7 @@ class AsciiStlReader {
       text_.skipLine();
       follows_end_ = false;
     } else if (!follows_end_) {
-      refuse(inQuotes(word) + " is no keyword of STL; repair the line or export again");
+      refuse(inQuotes(word) + " is not a keyword of STL; repair the line or export again");
     }
   }
 
@@ -362,7 +362,7 @@ class AsciiStlReader {
     if (equalsIgnoringCase(what, "facet")) return endFacet();
     if (equalsIgnoringCase(what, "solid")) return endSolid();
     refuse(inQuotes("end " + std::string(what)) +
-           " is no keyword of STL; repair the line or export again");
+           " is not a keyword of STL; repair the line or export again");
   }
 
   /// `name` is glued to the keyword, or empty.

@@ -26,7 +26,7 @@ class ProfileParser {
   explicit ProfileParser(const std::string& text) {
     const ordered_json json = parsedJson(text);
     if (!json.is_object()) {
-      problems_.emplace_back("the text is no JSON object");
+      problems_.emplace_back("the text is not a JSON object");
       return;
     }
     known(json, {"name", "title", "source", "pitch_mm", "build_mm", "point_spread_mm", "materials"},
@@ -98,7 +98,7 @@ class ProfileParser {
     const std::string where = "material " + std::to_string(profile_.materials.size() + 1) + ": ";
     Material& material = profile_.materials.emplace_back();
     if (!entry.is_object()) {
-      problems_.push_back(where + "it is no JSON object");
+      problems_.push_back(where + "it is not a JSON object");
       return;
     }
     known(entry, {"name", "rgba"}, where);

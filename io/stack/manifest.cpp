@@ -48,11 +48,11 @@ class ManifestParser {
     try {
       json_ = ordered_json::parse(bytes.begin(), bytes.end());
     } catch (const ordered_json::parse_error& error) {
-      refuse("it is no JSON from byte " + std::to_string(error.byte) + " on");
+      refuse("it is not JSON from byte " + std::to_string(error.byte) + " on");
     } catch (const ordered_json::exception&) {
       refuse("it holds a number that is too large");
     }
-    if (!json_.is_object()) refuse("it is no JSON object");
+    if (!json_.is_object()) refuse("it is not a JSON object");
   }
 
   [[nodiscard]] const ordered_json& json() const { return json_; }
@@ -69,7 +69,7 @@ class ManifestParser {
 
   [[nodiscard]] std::string text(const ordered_json& json, const std::string& key) const {
     const ordered_json& value = member(json, key);
-    if (!value.is_string()) refuse("'" + key + "' is no text");
+    if (!value.is_string()) refuse("'" + key + "' is not a text");
     return value.get<std::string>();
   }
 
@@ -81,7 +81,7 @@ class ManifestParser {
 
   [[nodiscard]] const ordered_json& list(const ordered_json& json, const std::string& key) const {
     const ordered_json& value = member(json, key);
-    if (!value.is_array()) refuse("'" + key + "' is no list");
+    if (!value.is_array()) refuse("'" + key + "' is not a list");
     return value;
   }
 
@@ -206,7 +206,7 @@ Manifest manifestOf(const ManifestParser& parser) {
   const ordered_json& printer = parser.member(json, "printer");
   if (!printer.is_null()) manifest.printer = jsonText(printer);
   for (const ordered_json& line : parser.list(json, "history")) {
-    if (!line.is_string()) parser.refuse("'history' is no list of texts");
+    if (!line.is_string()) parser.refuse("'history' is not a list of texts");
     manifest.history.push_back(line.get<std::string>());
   }
   for (const ordered_json& entry : parser.list(json, "slices")) {

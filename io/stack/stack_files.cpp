@@ -23,7 +23,7 @@ std::set<std::string> filesOfStack(const fs::path& folder) {
   std::error_code none;
   if (!fs::exists(folder / manifest_name, none)) {
     throw UsageError("'" + folder.string() + "' holds no " + manifest_name +
-                     ", so it is no stack of slices to overwrite; name another folder");
+                     ", so it is not a stack of slices to overwrite; name another folder");
   }
   try {
     std::set<std::string> names = filesNamedBy(StackInput(folder));
@@ -88,7 +88,7 @@ StackInput::StackInput(const fs::path& path) : place_(path), manifest_name_(mani
   }
   if (!contains(manifest_name_)) {
     throw DataError("'" + path.string() + "' holds no " + manifest_name +
-                    ", so it is no stack made by slice-export");
+                    ", so it is not a stack made by slice-export");
   }
 }
 

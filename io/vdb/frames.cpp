@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include <vector>
 
-#include "io/file/standard_streams.h"
+#include "io/file/descriptor_wait.h"
 #include "io/vdb/archive_digest.h"
 #include "io/vdb/archive_reader.h"
 #include "io/vdb/grid_checks.h"

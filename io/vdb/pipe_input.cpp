@@ -3,11 +3,10 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
-#include <poll.h>
 #include <unistd.h>
 
+#include "io/file/descriptor_wait.h"
 #include "vdbdither/model/errors.h"
-#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 
@@ -15,18 +14,6 @@ namespace {
 
 [[noreturn]] void fail(const std::string& where) {
   throw DataError("cannot read " + where + ": " + std::strerror(errno));
-}
-
-/// Returns once there is something to read, or the end.
-void waitForInput(int descriptor) {
-  // A signal may arrive just before the wait begins, or in another thread.
-  constexpr int look_again_milliseconds = 100;
-  pollfd wanted{descriptor, POLLIN, 0};
-  int ready = 0;
-  do {
-    throwIfInterrupted();
-    ready = ::poll(&wanted, 1, look_again_milliseconds);
-  } while (ready == 0 || (ready < 0 && errno == EINTR));
 }
 
 }  // namespace

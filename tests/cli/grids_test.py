@@ -79,7 +79,7 @@ class Names(ProgramTest):
         content = (self.folder / "part.vdb").read_bytes()
         (self.folder / "bad.vdb").write_bytes(patched(content, (WHITE, WHITE.replace(b"white", b"\\u001"))))
         code, printed, said = self.say("info", "bad.vdb")
-        self.assertEqual((code, said), (1, "vdbdither info: the metadata vdbdither:materials is not a table of materials: it is no JSON list; "
+        self.assertEqual((code, said), (1, "vdbdither info: the metadata vdbdither:materials is not a table of materials: it is not a JSON list; "
                                            "assign the materials again\n"))
         (self.folder / "bad.vdb").write_bytes(patched(content, (WHITE, WHITE.replace(b"white", b"a\\n\\r"))))
         code, printed, said = self.say("info", "bad.vdb")

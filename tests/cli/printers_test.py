@@ -40,7 +40,7 @@ class Printers(ProgramTest):
         self.refuse(1, "'odd.json' is not a printer profile: 'bild_mm' means nothing", "mesh2sdf", "part.stl", "--printer",
                     "odd.json", "-o", "x.vdb")
         (self.folder / "none.json").write_text("42")
-        self.assertEqual(self.run_program("printers", "check", "none.json").stdout.decode(), "the text is no JSON object\n")
+        self.assertEqual(self.run_program("printers", "check", "none.json").stdout.decode(), "the text is not a JSON object\n")
 
     def test_what_is_no_action_is_told(self):
         self.refuse(2, "printers: action: 'sell' is not accepted; choose list, show or check", "printers", "sell")

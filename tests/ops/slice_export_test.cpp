@@ -294,7 +294,7 @@ TEST(SliceExport, OverwritingReplacesAStackAndNothingElse) {
         Export({scratch / "out", "--overwrite"}).run(smallJob());
       },
       ThrowsMessage<UsageError>("'" + (scratch / "out").string() +
-                                "' holds no manifest.json, so it is no stack of slices to "
+                                "' holds no manifest.json, so it is not a stack of slices to "
                                 "overwrite; name another folder"));
 }
 

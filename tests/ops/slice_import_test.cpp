@@ -207,7 +207,7 @@ TEST_F(SliceImport, RefusesAStackThatIsNoneOrLacksSlices) {
   fs::create_directory(scratch_ / "empty");
   EXPECT_THAT([&] { Import(scratch_ / "empty").source().plan(); },
               ThrowsMessage<DataError>(
-                  HasSubstr("holds no manifest.json, so it is no stack made by slice-export")));
+                  HasSubstr("holds no manifest.json, so it is not a stack made by slice-export")));
   std::ofstream(scratch_ / "empty/manifest.json") << "{}";
   EXPECT_THAT([&] { Import(scratch_ / "empty").source().plan(); },
               ThrowsMessage<DataError>(HasSubstr("is not a manifest of slice-export: ")));

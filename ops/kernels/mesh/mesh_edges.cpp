@@ -53,4 +53,18 @@ MeshEdges::MeshEdges(const Mesh& mesh, std::size_t triangles) {
   edges_.push_back({0, 0, static_cast<std::uint32_t>(halves_.size())});
 }
 
+int MeshEdges::surplus(const Mesh& mesh, std::uint32_t edge) const {
+  int surplus = 0;
+  for (const std::uint32_t half : halves(edge))
+    surplus += mesh.triangles[half / 3][half % 3] == edges_[edge].from ? 1 : -1;
+  return surplus;
+}
+
+bool isBalanced(const Mesh& mesh) {
+  const MeshEdges edges(mesh);
+  for (std::uint32_t e = 0; e < edges.size(); ++e)
+    if (edges.surplus(mesh, e) != 0) return false;
+  return true;
+}
+
 }  // namespace vdbdither

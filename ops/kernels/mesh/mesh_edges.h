@@ -28,6 +28,8 @@ class MeshEdges {
   [[nodiscard]] std::span<const std::uint32_t> halves(std::uint32_t edge) const {
     return {halves_.data() + edges_[edge].first, edges_[edge + 1].first - edges_[edge].first};
   }
+  /// How many more sides of triangles of `mesh` go along an edge than against it.
+  [[nodiscard]] int surplus(const Mesh& mesh, std::uint32_t edge) const;
   [[nodiscard]] double memoryBytes() const {
     return static_cast<double>(edges_.capacity() * sizeof(Edge) +
                                halves_.capacity() * sizeof(std::uint32_t));
@@ -37,5 +39,8 @@ class MeshEdges {
   std::vector<Edge> edges_;  ///< sorted by `from`, then `to`; one more entry ends the last edge
   std::vector<std::uint32_t> halves_;
 };
+
+/// Whether an opposite side meets every side of the triangles.
+bool isBalanced(const Mesh& mesh);
 
 }  // namespace vdbdither

@@ -12,22 +12,6 @@
 
 namespace vdbdither {
 
-namespace {
-
-/// Whether as many triangles go along every edge in one direction as in the other.
-bool isClosed(const Mesh& mesh) {
-  const MeshEdges edges(mesh);
-  for (std::uint32_t e = 0; e < edges.size(); ++e) {
-    int surplus = 0;
-    for (const std::uint32_t half : edges.halves(e))
-      surplus += mesh.triangles[half / 3][half % 3] == edges[e].from ? 1 : -1;
-    if (surplus != 0) return false;
-  }
-  return true;
-}
-
-}  // namespace
-
 std::vector<Mesh> partsOf(Mesh mesh) {
   constexpr auto none = std::numeric_limits<std::uint32_t>::max();
   std::set<std::string> names;
@@ -50,7 +34,7 @@ std::vector<Mesh> partsOf(Mesh mesh) {
         corner = vertex;
       }
     }
-    if (names.size() <= i || !isClosed(part)) {
+    if (names.size() <= i || !isBalanced(part)) {
       parts.clear();
       break;
     }

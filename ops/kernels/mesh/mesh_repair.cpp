@@ -68,9 +68,7 @@ struct Border {
 std::vector<Border> bordersOf(const Mesh& mesh, const MeshEdges& edges) {
   std::vector<Border> borders;
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
-    int surplus = 0;
-    for (const std::uint32_t half : edges.halves(e))
-      surplus += mesh.triangles[half / 3][half % 3] == edges[e].from ? 1 : -1;
+    const int surplus = edges.surplus(mesh, e);
     if (surplus > 0) borders.push_back({edges[e].from, edges[e].to, surplus});
     if (surplus < 0) borders.push_back({edges[e].to, edges[e].from, -surplus});
   }
@@ -117,9 +115,6 @@ void weldBorders(DerivedMesh& made, MeshRepairs& repairs) {
   }
   if (repairs.welded_vertices > 0) renumber(made, to, repairs);
 }
-
-/// Whether an opposite side meets every side.
-bool isClosed(const Mesh& mesh) { return bordersOf(mesh, MeshEdges(mesh)).empty(); }
 
 /// `mesh` without the triangles to drop.
 Mesh remaining(const Mesh& mesh, const std::vector<bool>& drop) {
@@ -175,7 +170,7 @@ void dropDuplicates(DerivedMesh& made, MeshRepairs& repairs) {
   }
   if (4 * walls.size() < mesh.triangles.size()) {
     for (const std::uint32_t wall : walls) drop[wall] = true;
-    if (!others.empty() && isClosed(mesh) && !isClosed(remaining(mesh, drop)))
+    if (!others.empty() && isBalanced(mesh) && !isBalanced(remaining(mesh, drop)))
       for (const std::uint32_t other : others) drop[other] = false;
   }
   const std::size_t before = drop.size();
@@ -237,15 +232,10 @@ std::vector<bool> boundParts(const Mesh& mesh, const std::vector<std::uint32_t>&
   const MeshEdges edges(mesh);
   std::map<std::uint32_t, int> surplus;  // of each part at an edge
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
-    if (edges.halves(e).size() < 3) continue;
+    if (edges.halves(e).size() < 3 || edges.surplus(mesh, e) != 0) continue;
     surplus.clear();
-    int sum = 0;
-    for (const std::uint32_t half : edges.halves(e)) {
-      const int way = mesh.triangles[half / 3][half % 3] == edges[e].from ? 1 : -1;
-      surplus[part[half / 3]] += way;
-      sum += way;
-    }
-    if (sum != 0) continue;
+    for (const std::uint32_t half : edges.halves(e))
+      surplus[part[half / 3]] += mesh.triangles[half / 3][half % 3] == edges[e].from ? 1 : -1;
     for (const auto& [some, own] : surplus)
       if (own != 0) bound[some] = true;
   }

@@ -142,7 +142,7 @@ TEST(MeshReader, ATextMayBeFilledUpWithZerosButHasNoneWithin) {
     const std::string begin = text + std::string(2000, '\n');
     EXPECT_EQ(refusal(begin + std::string(3, '\0') + text),
               "'part', byte " + std::to_string(begin.size()) +
-                  ": a zero, so this is no text; export it again");
+                  ": a zero, so this is not a text; export it again");
   }
 }
 

@@ -213,7 +213,7 @@ TEST(Ply, RefusesABadHeader) {
   EXPECT_EQ(refused("element vertex 1\nproperty int\n"),
             "'part', line 4: a property has no name; export it again");
   EXPECT_EQ(refused("elements vertex 1\n"),
-            "'part', line 3: 'elements' is no keyword of a PLY header; export it again");
+            "'part', line 3: 'elements' is not a keyword of a PLY header; export it again");
   EXPECT_EQ(refused("element vertex 1\nproperty int x\nproperty list int int y\nend_header\n"),
             "'part': the vertices have no scalar property 'y'; export it again");
   EXPECT_EQ(refused("element face 1\nproperty list int int corners\nend_header\n"),

@@ -287,9 +287,9 @@ TEST(Stl, RefusesAsciiThatIsNotAsItShouldBe) {
   EXPECT_EQ(body(loop + "vertex 0 0 0 0\n"),
             "'part', line 4: a vertex is not three numbers; repair the line or export again");
   EXPECT_EQ(body("facets\n"),
-            "'part', line 2: 'facets' is no keyword of STL; repair the line or export again");
+            "'part', line 2: 'facets' is not a keyword of STL; repair the line or export again");
   EXPECT_EQ(body("end of it\n"),
-            "'part', line 2: 'end of' is no keyword of STL; repair the line or export again");
+            "'part', line 2: 'end of' is not a keyword of STL; repair the line or export again");
 }
 
 }  // namespace

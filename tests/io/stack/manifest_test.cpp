@@ -248,8 +248,8 @@ TEST(Manifest, RefusesValuesThatAreNone) {
   EXPECT_EQ(with("  0.125,", "  1e300,"),
             "'origin_mm' must be three lengths of at most 1000000 mm");
   EXPECT_EQ(with("   -1,\n   0,\n   4\n", "   -1, 4\n"), "'min' must be three whole numbers");
-  EXPECT_EQ(with("\"mesh2sdf part.stl\"", "7"), "'history' is no list of texts");
-  EXPECT_EQ(with("\"format\": \"png1\"", "\"format\": null"), "'format' is no text");
+  EXPECT_EQ(with("\"mesh2sdf part.stl\"", "7"), "'history' is not a list of texts");
+  EXPECT_EQ(with("\"format\": \"png1\"", "\"format\": null"), "'format' is not a text");
   EXPECT_EQ(with("\"slices\"", "\"slice\""), "'slices' is missing");
 }
 
@@ -356,7 +356,7 @@ TEST(Manifest, RefusesOtherFiles) {
                 ThrowsMessage<DataError>(HasSubstr("is not a manifest of slice-export: ")));
   }
   EXPECT_EQ(refusal("{\"a\": nothing}"),
-            "manifest.json' is not a manifest of slice-export: it is no JSON from byte 8 on; make "
+            "manifest.json' is not a manifest of slice-export: it is not JSON from byte 8 on; make "
             "the stack again with slice-export");
 }
 

@@ -184,7 +184,7 @@ TEST_F(Stack, IsPutBackWhereAKilledRunPutItAside) {
 TEST_F(Stack, IsReadThroughTheManifestThatIsNamed) {
   fs::rename(out("manifest.json"), out("other.JSON"));
   EXPECT_EQ(refusal(EditedStack::refused, "out/other.JSON"), "");
-  EXPECT_EQ(refusal(), "'OUT' holds no manifest.json, so it is no stack made by slice-export");
+  EXPECT_EQ(refusal(), "'OUT' holds no manifest.json, so it is not a stack made by slice-export");
 }
 
 TEST_F(Stack, MayHoldLinksToItsOwnFilesOnly) {
