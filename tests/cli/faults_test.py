@@ -1,11 +1,9 @@
 """Full disks, folders without permission to write, and paths that are of the wrong kind."""
 
 import os
-import pathlib
 import re
 import signal
 import subprocess
-import tempfile
 import time
 import unittest
 
@@ -18,9 +16,7 @@ class FullDisk(ProgramTest):
 
     @classmethod
     def setUpClass(cls):
-        holder = tempfile.TemporaryDirectory(prefix="vdbdither-test-")
-        cls.addClassCleanup(holder.cleanup)
-        cls.inputs = pathlib.Path(holder.name)
+        cls.inputs = cls.folder_of_class()
         meshes.write_stl(cls.inputs / "part.stl", meshes.sphere(0.6))
         for line in (("mesh2sdf", "part.stl", *MIMAKI, "!", "normals", "!", "dither", "!", "material-assign", "-o", "part.vdb"),
                      ("mesh-export", "-i", "part.vdb", "print.ply")):

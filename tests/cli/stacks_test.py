@@ -3,12 +3,10 @@
 import hashlib
 import json
 import os
-import pathlib
 import resource
 import shutil
 import struct
 import subprocess
-import tempfile
 import unittest
 import warnings
 import zipfile
@@ -42,9 +40,7 @@ class Stacks(ProgramTest):
 
     @classmethod
     def setUpClass(cls):
-        holder = tempfile.TemporaryDirectory(prefix="vdbdither-test-")
-        cls.addClassCleanup(holder.cleanup)
-        cls.made = pathlib.Path(holder.name)
+        cls.made = cls.folder_of_class()
         meshes.write_stl(cls.made / "part.stl", meshes.box((1, 1, 0.3)))
         for line in (("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "--mask", "white", "!", "material-assign", "-o", "part.vdb"),
                      ("slice-export", "-i", "part.vdb", "out"), ("slice-export", "-i", "part.vdb", "out.zip"),

@@ -2,10 +2,8 @@
 
 import fcntl
 import os
-import pathlib
 import signal
 import subprocess
-import tempfile
 import time
 import unittest
 
@@ -65,9 +63,7 @@ class Stopped(ProgramTest):
 
     @classmethod
     def setUpClass(cls):
-        holder = tempfile.TemporaryDirectory(prefix="vdbdither-test-")
-        cls.addClassCleanup(holder.cleanup)
-        cls.inputs = pathlib.Path(holder.name)
+        cls.inputs = cls.folder_of_class()
         meshes.write_stl(cls.inputs / "part8.stl", meshes.sphere(8, 60))
 
     def setUp(self):

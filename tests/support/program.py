@@ -45,6 +45,13 @@ class ProgramTest(unittest.TestCase):
         self.addCleanup(holder.cleanup)
         self.folder = pathlib.Path(holder.name)
 
+    @classmethod
+    def folder_of_class(cls):
+        """Returns a new folder that lasts as long as the tests of the class, for what they share."""
+        holder = tempfile.TemporaryDirectory(prefix="vdbdither-test-")
+        cls.addClassCleanup(holder.cleanup)
+        return pathlib.Path(holder.name)
+
     def environment(self):
         """Returns an environment with the program and the links of operators on the PATH."""
         return {**os.environ, "PATH": f"{PROGRAM.parent}:{PROGRAM.parent / 'operators'}:{os.environ['PATH']}"}
