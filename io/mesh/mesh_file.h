@@ -11,6 +11,10 @@
 
 namespace vdbdither {
 
+/// Whether the colours of a mesh are read as well. Files that only they need are not looked at
+/// otherwise.
+enum class MeshColours { skip, read };
+
 /// The content of a mesh file, and how its parser speaks of it: in single lines that start with its
 /// name.
 class MeshFile {
@@ -18,11 +22,21 @@ class MeshFile {
   /// @param name   shown in messages; its ending settles what the content leaves open
   /// @param bytes  must outlive the object
   /// @param warn   called with each warning; may be empty
-  MeshFile(std::string name, std::string_view bytes, std::function<void(const std::string&)> warn)
-      : name_(std::move(name)), bytes_(bytes), warn_(std::move(warn)) {}
+  MeshFile(std::string name, std::string_view bytes, std::function<void(const std::string&)> warn,
+           MeshColours colours = MeshColours::skip)
+      : name_(std::move(name)), bytes_(bytes), warn_(std::move(warn)), colours_(colours) {}
   /// @param file  must outlive the object
-  MeshFile(FileBytes& file, std::function<void(const std::string&)> warn)
-      : name_(file.path()), bytes_(file.head()), file_(&file), warn_(std::move(warn)) {}
+  MeshFile(FileBytes& file, std::function<void(const std::string&)> warn,
+           MeshColours colours = MeshColours::skip)
+      : name_(file.path()),
+        bytes_(file.head()),
+        file_(&file),
+        warn_(std::move(warn)),
+        colours_(colours) {}
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  /// Whether `Mesh::appearance` is wanted.
+  [[nodiscard]] bool wantsColours() const { return colours_ == MeshColours::read; }
 
   [[nodiscard]] std::size_t size() const {
     return file_ != nullptr ? file_->size() : bytes_.size();
@@ -56,6 +70,7 @@ class MeshFile {
   std::string_view bytes_;  ///< all of them, or the head of `file_`
   FileBytes* file_ = nullptr;
   std::function<void(const std::string&)> warn_;
+  MeshColours colours_ = MeshColours::skip;
 };
 
 /// Returns `text` in single quotes, fit for one line of a terminal: unprintable bytes become '?',

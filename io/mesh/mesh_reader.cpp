@@ -88,9 +88,9 @@ Mesh parseMesh(const MeshFile& file) {
 }
 
 Mesh readMesh(const std::filesystem::path& path,
-              const std::function<void(const std::string&)>& warn) {
+              const std::function<void(const std::string&)>& warn, MeshColours colours) {
   FileBytes file(path.string());
-  return parseMesh(MeshFile(file, warn));
+  return parseMesh(MeshFile(file, warn, colours));
 }
 
 }  // namespace vdbdither

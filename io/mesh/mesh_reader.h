@@ -17,11 +17,13 @@ namespace vdbdither {
 /// exactly the same position (−0 equals +0) share one vertex; OBJ and PLY keep the vertices of the
 /// file. Polygons come back as triangles that cover them, also when they are concave.
 ///
-/// @param path  a regular file; one that is written to while it is read is refused
-/// @param warn  receives a line for each irregularity that was read anyway; may be empty
+/// @param path     a regular file; one that is written to while it is read is refused
+/// @param warn     receives a line for each irregularity that was read anyway; may be empty
+/// @param colours  with `read`, `Mesh::appearance` holds the colours of the file, if it has any
 /// @throws DataError for everything else: what is wrong, on which line or byte, and what to do
 Mesh readMesh(const std::filesystem::path& path,
-              const std::function<void(const std::string&)>& warn);
+              const std::function<void(const std::string&)>& warn,
+              MeshColours colours = MeshColours::skip);
 
 /// The same for a file whose bytes are in memory.
 Mesh parseMesh(const MeshFile& file);

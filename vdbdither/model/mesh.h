@@ -2,10 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <openvdb/Types.h>
+
+#include "vdbdither/model/appearance.h"
 
 namespace vdbdither {
 
@@ -26,6 +29,9 @@ struct Mesh {
   /// In the order of the triangles, where a file names two or more. Only readers set them, and
   /// `partsOf` reads them: meshes made from others have none.
   std::vector<MeshPart> parts{};
+  /// Of all triangles; null where the file has no colours or they were not asked for. Only readers
+  /// set it.
+  std::shared_ptr<const Appearance> appearance{};
 };
 
 }  // namespace vdbdither
