@@ -125,41 +125,58 @@ TEST(TextureJpeg, ReadsInksThatAreStoredAsAmounts) {
       coded);
 }
 
+constexpr std::size_t none = 99;
+
+Bytes withProfile(Bytes bytes, const Bytes& profile, std::size_t pieces, bool is_reversed,
+                  std::size_t left_out) {
+  Bytes segments;
+  for (std::size_t i = 0; i < pieces; ++i) {
+    const std::size_t piece = is_reversed ? pieces - 1 - i : i;
+    if (piece == left_out) continue;
+    const std::size_t begin = profile.size() * piece / pieces;
+    const std::size_t end = profile.size() * (piece + 1) / pieces;
+    const std::size_t length = 16 + end - begin;
+    const std::string name("ICC_PROFILE\0", 12);
+    segments.insert(segments.end(), {0xFF, 0xE2, static_cast<std::uint8_t>(length >> 8),
+                                     static_cast<std::uint8_t>(length)});
+    segments.insert(segments.end(), name.begin(), name.end());
+    segments.push_back(static_cast<std::uint8_t>(piece + 1));
+    segments.push_back(static_cast<std::uint8_t>(pieces));
+    segments.insert(segments.end(), profile.begin() + static_cast<std::ptrdiff_t>(begin),
+                    profile.begin() + static_cast<std::ptrdiff_t>(end));
+  }
+  bytes.insert(bytes.begin() + 2, segments.begin(), segments.end());
+  return bytes;
+}
+
 TEST(TextureJpeg, HonoursProfilesInSeveralPieces) {
   const Samples samples = slope(33, 17, 3);
+  const Bytes bytes = jpegOf(samples);
   const Bytes profile = test::swappedProfile(1.8);
-  const auto withProfile = [&](std::size_t pieces, bool is_reversed, std::size_t left_out) {
-    Bytes bytes = jpegOf(samples);
-    Bytes segments;
-    for (std::size_t i = 0; i < pieces; ++i) {
-      const std::size_t piece = is_reversed ? pieces - 1 - i : i;
-      if (piece == left_out) continue;
-      const std::size_t begin = profile.size() * piece / pieces;
-      const std::size_t end = profile.size() * (piece + 1) / pieces;
-      const std::size_t length = 16 + end - begin;
-      const std::string name("ICC_PROFILE\0", 12);
-      segments.insert(segments.end(), {0xFF, 0xE2, static_cast<std::uint8_t>(length >> 8),
-                                       static_cast<std::uint8_t>(length)});
-      segments.insert(segments.end(), name.begin(), name.end());
-      segments.push_back(static_cast<std::uint8_t>(piece + 1));
-      segments.push_back(static_cast<std::uint8_t>(pieces));
-      segments.insert(segments.end(), profile.begin() + static_cast<std::ptrdiff_t>(begin),
-                      profile.begin() + static_cast<std::ptrdiff_t>(end));
-    }
-    bytes.insert(bytes.begin() + 2, segments.begin(), segments.end());
-    return bytes;
-  };
-  constexpr std::size_t none = 99;
   for (const bool is_reversed : {false, true}) {
     expectTexels(
-        decoded(withProfile(3, is_reversed, none)), 33, 17,
+        decoded(withProfile(bytes, profile, 3, is_reversed, none)), 33, 17,
         [&](auto x, auto y) {
           const auto light = [&](int i) { return std::pow(samples.share(x, y, i), 1.8); };
           return Colour{light(2), light(0), light(1), 1};
         },
         coded);
   }
-  EXPECT_EQ(decoded(withProfile(3, false, 1)).texels, decoded(jpegOf(samples)).texels);
+  EXPECT_EQ(decoded(withProfile(bytes, profile, 3, false, 1)).texels, decoded(bytes).texels);
+}
+
+TEST(TextureJpeg, HonoursProfilesOfInks) {
+  const Samples samples = slope(33, 17, 4);
+  const Bytes profile = test::tableProfile(4);
+  const std::size_t pieces = profile.size() / 60000 + 1;
+  // The samples are light, that is one less the ink.
+  expectTexels(
+      decoded(withProfile(jpegOf(samples), profile, pieces, false, none)), 33, 17,
+      [&](auto x, auto y) {
+        const auto light = [&](int i) { return samples.share(x, y, i) * samples.share(x, y, 3); };
+        return Colour{light(0), light(1), light(2), 1};
+      },
+      coded);
 }
 
 TEST(TextureJpeg, RefusesWhatIsDamagedOrCutShort) {

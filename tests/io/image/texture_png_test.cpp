@@ -120,6 +120,16 @@ TEST(TexturePng, HonoursProfiles) {
       2e-4);
 }
 
+TEST(TexturePng, HonoursProfilesOfTables) {
+  const Samples samples = pattern(9, 5, 3);
+  expectTexels(
+      decoded(pngOf(samples, false, {.icc_profile = test::tableProfile(3)})), 9, 5,
+      [&](auto x, auto y) {
+        return Colour{samples.share(x, y, 1), samples.share(x, y, 2), samples.share(x, y, 0), 1};
+      },
+      0.015);
+}
+
 void append(Bytes& bytes, std::uint32_t value) {
   for (int shift = 24; shift >= 0; shift -= 8)
     bytes.push_back(static_cast<std::uint8_t>(value >> shift));
