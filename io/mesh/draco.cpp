@@ -38,19 +38,24 @@ std::vector<Vec3d> verticesOf(const MeshFile& file, const DracoValues& positions
 }
 
 /// The colours are encoded like sRGB, whether they are bytes or 0 … 1, as PLY has them.
+float linearColour(const DracoValues& colours, double value) {
+  if (colours.is_integer && colours.one == 255)
+    return linearOfSrgbBytes()[static_cast<std::size_t>(value)];
+  return static_cast<float>(linearOfSrgb(value / colours.one));
+}
+
 std::vector<openvdb::Vec4f> linearColours(const DracoValues& colours) {
   const auto components = static_cast<std::size_t>(colours.components);
   std::vector<openvdb::Vec4f> linear(colours.values.size() / components,
                                      openvdb::Vec4f(0, 0, 0, 1));
+  // One or two components are a grey, and its opacity.
+  const bool is_grey = components < 3;
   for (std::size_t i = 0; i < linear.size(); ++i) {
-    for (std::size_t c = 0; c < 4; ++c) {
-      // One or two components are a grey, and its opacity.
-      if (c == 3 && components % 2 != 0) continue;
-      const std::size_t from = components > 2 ? c : c / 3;
-      const double value = colours.values[i * components + from] / colours.one;
-      const double share = value > 0 ? std::min(value, 1.0) : 0;  // not a number: 0
-      linear[i][static_cast<int>(c)] = static_cast<float>(c == 3 ? share : linearOfSrgb(share));
-    }
+    const double* value = &colours.values[i * components];
+    for (int c = 0; c < 3; ++c) linear[i][c] = linearColour(colours, value[is_grey ? 0 : c]);
+    if (components % 2 != 0) continue;
+    const double opacity = value[components - 1] / colours.one;
+    linear[i][3] = opacity > 0 ? static_cast<float>(std::min(opacity, 1.0)) : 0;
   }
   return linear;
 }
