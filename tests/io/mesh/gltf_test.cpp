@@ -256,7 +256,7 @@ TEST(Gltf, ReadsQuantizedPositions) {
   file.json["extensionsRequired"] = {"KHR_mesh_quantization"};
   file.addMesh({{"attributes", {{"POSITION", bytes}}}});
   EXPECT_EQ(parseQuietly(file.text()).vertices,
-            (std::vector<Vec3d>{{-1000, 0, 0}, {0, 1000, 0}, {0, 0, 0}}));
+            (std::vector<Vec3d>{{-1000, 0, 0}, {1000, 0, 0}, {0, 0, 1000}}));
   file.json["accessors"][0].erase("normalized");
   EXPECT_EQ(parseQuietly(file.text()).vertices[0], Vec3d(-128000, 0, 0));
 }
