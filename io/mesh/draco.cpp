@@ -166,7 +166,7 @@ const MeshFormat draco{.name = "Draco",
                        .write = makeMeshEncoder<DracoEncoder>,
                        .holds_extras = true,
                        .most = (std::uint64_t{1} << 31) / sizeof(openvdb::Vec3s),
-                       .bytes_per_vertex = 15,
-                       .us_per_vertex = 0.3};
+                       .bytes_per_vertex = 17.5,
+                       .us_per_vertex = 0.5};
 
 }  // namespace vdbdither
