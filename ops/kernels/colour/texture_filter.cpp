@@ -1,0 +1,188 @@
+// Textures are averaged in a pyramid (L. Williams, "Pyramidal parametrics", SIGGRAPH 1983) at
+// several places of a parallelogram (J. McCormack, R. Perry, K. Farkas, N. Jouppi, "Feline: fast
+// elliptical lines for anisotropic texture mapping", SIGGRAPH 1999).
+
+#include "ops/kernels/colour/texture_filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+namespace vdbdither {
+
+using openvdb::Vec2d;
+using openvdb::Vec2f;
+using openvdb::Vec4f;
+
+namespace {
+
+/// Samples of a level are at most so many along the shorter side of a parallelogram: few enough to
+/// be fast, so many that the texels of the level, which are squares, hardly widen it.
+constexpr double most_across = 4;
+constexpr double most_along = 64;
+
+/// The texels of a row or column that one of the next level covers, and how much of each.
+struct Cover {
+  std::uint32_t begin, end;
+  std::uint64_t first, last;  ///< shares of the first and the last texel, of `whole`
+  std::uint64_t whole;
+};
+
+Cover coverOf(std::uint32_t at, std::uint32_t size, std::uint32_t next_size) {
+  const std::uint64_t low = std::uint64_t{at} * size;  // in parts of 1 / next_size
+  const std::uint64_t high = low + size;
+  const auto begin = static_cast<std::uint32_t>(low / next_size);
+  const auto end = static_cast<std::uint32_t>((high + next_size - 1) / next_size);
+  const std::uint64_t first = std::min((begin + std::uint64_t{1}) * next_size, high) - low;
+  const std::uint64_t last = end - begin > 1 ? high - (end - std::uint64_t{1}) * next_size : first;
+  return {begin, end, first, last, next_size};
+}
+
+std::uint64_t shareOf(const Cover& cover, std::uint32_t at) {
+  if (at == cover.begin) return cover.first;
+  return at + 1 == cover.end ? cover.last : cover.whole;
+}
+
+/// Returns the image with half as many texels along each side, rounded up.
+Texture halved(const Texture& image) {
+  Texture half;
+  half.width = (image.width + 1) / 2;
+  half.height = (image.height + 1) / 2;
+  half.texels.resize(std::size_t{half.width} * half.height);
+  const std::uint64_t area = std::uint64_t{image.width} * image.height;
+  tbb::parallel_for(std::uint32_t{0}, half.height, [&](std::uint32_t y) {
+    const Cover rows = coverOf(y, image.height, half.height);
+    for (std::uint32_t x = 0; x < half.width; ++x) {
+      const Cover columns = coverOf(x, image.width, half.width);
+      std::array<std::uint64_t, 4> sum{};
+      for (std::uint32_t row = rows.begin; row < rows.end; ++row)
+        for (std::uint32_t column = columns.begin; column < columns.end; ++column) {
+          const std::uint64_t share = shareOf(rows, row) * shareOf(columns, column);
+          const Texture::Texel& texel = image.texels[std::size_t{row} * image.width + column];
+          for (std::size_t c = 0; c < 4; ++c) sum[c] += share * texel[c];
+        }
+      Texture::Texel& made = half.texels[std::size_t{y} * half.width + x];
+      for (std::size_t c = 0; c < 4; ++c)
+        made[c] = static_cast<std::uint16_t>((sum[c] + area / 2) / area);
+    }
+  });
+  return half;
+}
+
+std::uint32_t wrapped(std::int64_t at, std::uint32_t size, TextureWrap wrap) {
+  const std::int64_t count = size;
+  if (at >= 0 && at < count) return static_cast<std::uint32_t>(at);
+  if (wrap == TextureWrap::clamp) return at < 0 ? 0 : size - 1;
+  const std::int64_t period = wrap == TextureWrap::mirror ? 2 * count : count;
+  const std::int64_t within = (at % period + period) % period;
+  return static_cast<std::uint32_t>(within < count ? within : period - 1 - within);
+}
+
+/// Coordinates far outside of the texture, of which nothing meaningful is left, stay in range.
+std::int64_t wholeOf(double at) {
+  constexpr double far = 1e15;
+  return static_cast<std::int64_t>(std::clamp(at, -far, far));
+}
+
+Vec4f texelAt(const Texture& image, std::int64_t x, std::int64_t y,
+              const std::array<TextureWrap, 2>& wrap) {
+  const Texture::Texel& texel =
+      image.texels[std::size_t{wrapped(y, image.height, wrap[1])} * image.width +
+                   wrapped(x, image.width, wrap[0])];
+  return {static_cast<float>(texel[0]), static_cast<float>(texel[1]), static_cast<float>(texel[2]),
+          static_cast<float>(texel[3])};
+}
+
+Vec4f interpolated(const Texture& image, double u, double v,
+                   const std::array<TextureWrap, 2>& wrap) {
+  const double x = u * image.width - 0.5;
+  const double y = v * image.height - 0.5;
+  const double left = std::floor(x);
+  const double top = std::floor(y);
+  const auto right_share = static_cast<float>(x - left);
+  const auto bottom_share = static_cast<float>(y - top);
+  const std::int64_t column = wholeOf(left);
+  const std::int64_t row = wholeOf(top);
+  const Vec4f upper = texelAt(image, column, row, wrap) * (1 - right_share) +
+                      texelAt(image, column + 1, row, wrap) * right_share;
+  const Vec4f lower = texelAt(image, column, row + 1, wrap) * (1 - right_share) +
+                      texelAt(image, column + 1, row + 1, wrap) * right_share;
+  return upper * (1 - bottom_share) + lower * bottom_share;
+}
+
+}  // namespace
+
+FilteredTexture::FilteredTexture(const Texture& texture) : texture_(&texture) {
+  while (level(smaller_.size()).width > 1 || level(smaller_.size()).height > 1)
+    smaller_.push_back(halved(level(smaller_.size())));
+}
+
+double FilteredTexture::memoryBytes() const {
+  double bytes = 0;
+  for (const Texture& copy : smaller_)
+    bytes += static_cast<double>(copy.texels.size() * sizeof(Texture::Texel));
+  return bytes;
+}
+
+TextureFootprint FilteredTexture::footprint(const std::array<Vec2d, 3>& edges) const {
+  const double width = texture_->width;
+  const double height = texture_->height;
+  double xx = 0;
+  double xy = 0;
+  double yy = 0;
+  for (const Vec2d& edge : edges) {
+    const double x = edge.x() * width;
+    const double y = edge.y() * height;
+    xx += x * x;
+    xy += x * y;
+    yy += y * y;
+  }
+  TextureFootprint made;
+  if (!std::isfinite(xx + yy)) return made;
+  // The axes of the ellipse with these moments. A side of the parallelogram along an axis has the
+  // variance of three edges of a box that lie along it.
+  const double middle = 0.5 * (xx + yy);
+  const double half = std::sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy);
+  Vec2d axis = xx >= yy ? Vec2d(0.5 * (xx - yy) + half, xy) : Vec2d(xy, 0.5 * (yy - xx) + half);
+  axis = axis.lengthSqr() > 0 ? axis / std::sqrt(axis.lengthSqr()) : Vec2d(1, 0);
+  double along = std::sqrt(middle + half);
+  double across = std::sqrt(std::max(0.0, middle - half));
+  double texel = 1;
+  while (made.level < smaller_.size() &&
+         (across > most_across * texel || along > most_along * texel)) {
+    ++made.level;
+    texel *= 2;
+  }
+  along = std::min(along, most_along * texel);
+  made.samples = {
+      static_cast<std::uint8_t>(std::clamp(std::ceil(along / texel), 1.0, most_along)),
+      static_cast<std::uint8_t>(std::clamp(std::ceil(across / texel), 1.0, most_along))};
+  made.side = {Vec2f(static_cast<float>(axis.x() * along / width),
+                     static_cast<float>(axis.y() * along / height)),
+               Vec2f(static_cast<float>(-axis.y() * across / width),
+                     static_cast<float>(axis.x() * across / height))};
+  return made;
+}
+
+Vec4f FilteredTexture::sample(const Vec2f& at, const TextureFootprint& footprint,
+                              const std::array<TextureWrap, 2>& wrap, bool is_smooth) const {
+  const Texture& image = level(footprint.level);
+  const bool is_interpolated = is_smooth || footprint.level > 0;
+  Vec4f sum(0, 0, 0, 0);
+  for (int i = 0; i < footprint.samples[0]; ++i) {
+    const double along = (i + 0.5) / footprint.samples[0] - 0.5;
+    for (int j = 0; j < footprint.samples[1]; ++j) {
+      const double across = (j + 0.5) / footprint.samples[1] - 0.5;
+      const double u = at.x() + footprint.side[0].x() * along + footprint.side[1].x() * across;
+      const double v = at.y() + footprint.side[0].y() * along + footprint.side[1].y() * across;
+      sum += is_interpolated ? interpolated(image, u, v, wrap)
+                             : texelAt(image, wholeOf(std::floor(u * image.width)),
+                                       wholeOf(std::floor(v * image.height)), wrap);
+    }
+  }
+  constexpr float whole = 65535;
+  return sum / (whole * static_cast<float>(footprint.samples[0] * footprint.samples[1]));
+}
+
+}  // namespace vdbdither
