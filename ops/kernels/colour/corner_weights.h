@@ -16,11 +16,11 @@ using CornerWeights = std::array<double, 3>;
 CornerWeights weightsOf(const openvdb::Vec3d& a, const openvdb::Vec3d& b, const openvdb::Vec3d& c,
                         const PointOnTriangle& at);
 
-/// Returns the mean of what the corners have.
+/// Returns the mean of what the corners have: exactly the same if all have the same.
 template <class Vector>
 Vector mixed(const std::array<Vector, 3>& corners, const CornerWeights& weights) {
-  return corners[0] * static_cast<float>(weights[0]) + corners[1] * static_cast<float>(weights[1]) +
-         corners[2] * static_cast<float>(weights[2]);
+  return corners[0] + (corners[1] - corners[0]) * static_cast<float>(weights[1]) +
+         (corners[2] - corners[0]) * static_cast<float>(weights[2]);
 }
 
 }  // namespace vdbdither

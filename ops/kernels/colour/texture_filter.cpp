@@ -17,10 +17,14 @@ using openvdb::Vec4f;
 
 namespace {
 
-/// Samples of a level are at most so many along the shorter side of a parallelogram: few enough to
-/// be fast, so many that the texels of the level, which are squares, hardly widen it.
-constexpr double most_across = 4;
-constexpr double most_along = 64;
+/// How far a parallelogram may reach on a level, in its texels, and how many samples it has for
+/// each of them. The texture itself may change from texel to texel; its copies are smoother, but
+/// their texels, which are squares, must be small beside the parallelogram.
+struct LevelLimits {
+  double across, along, samples_per_texel;
+};
+constexpr LevelLimits limits_of_texture{2, 32, 2};
+constexpr LevelLimits limits_of_copies{4, 64, 1};
 
 /// The texels of a row or column that one of the next level covers, and how much of each.
 struct Cover {
@@ -149,15 +153,21 @@ TextureFootprint FilteredTexture::footprint(const std::array<Vec2d, 3>& edges) c
   double along = std::sqrt(middle + half);
   double across = std::sqrt(std::max(0.0, middle - half));
   double texel = 1;
+  LevelLimits limits = limits_of_texture;
   while (made.level < smaller_.size() &&
-         (across > most_across * texel || along > most_along * texel)) {
+         (across > limits.across * texel || along > limits.along * texel)) {
     ++made.level;
     texel *= 2;
+    limits = limits_of_copies;
   }
-  along = std::min(along, most_along * texel);
-  made.samples = {
-      static_cast<std::uint8_t>(std::clamp(std::ceil(along / texel), 1.0, most_along)),
-      static_cast<std::uint8_t>(std::clamp(std::ceil(across / texel), 1.0, most_along))};
+  along = std::min(along, limits.along * texel);
+  const auto samples = [&](double length) {
+    // Two samples are exact on both sides of the middle of a texel, where the slope changes.
+    const double least = length > 0.25 * texel ? 2 : 1;
+    const double wanted = std::ceil(length / texel * limits.samples_per_texel);
+    return static_cast<std::uint8_t>(std::clamp(wanted, least, 255.0));
+  };
+  made.samples = {samples(along), samples(std::min(across, along))};
   made.side = {Vec2f(static_cast<float>(axis.x() * along / width),
                      static_cast<float>(axis.y() * along / height)),
                Vec2f(static_cast<float>(-axis.y() * across / width),
