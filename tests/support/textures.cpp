@@ -1,81 +1,239 @@
 #include "tests/support/textures.h"
 
 #include <cmath>
-#include <utility>
+#include <cstring>
+#include <lcms2.h>
+#include <random>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither::test {
 
-using openvdb::Vec2f;
-using openvdb::Vec3d;
-using openvdb::Vec4d;
-using openvdb::Vec4f;
+double Samples::share(std::uint32_t x, std::uint32_t y, int channel) const {
+  const std::size_t at = (std::size_t{y} * width + x) * static_cast<std::size_t>(channels) +
+                         static_cast<std::size_t>(channel);
+  return values[at] / static_cast<double>((1 << bits) - 1);
+}
 
-Texture makeTexture(std::uint32_t width, std::uint32_t height, const TexelColour& colour) {
-  Texture texture{width, height, {}};
-  for (std::uint32_t y = 0; y < height; ++y)
+Bytes Samples::packed() const {
+  if (bits == 8) return {values.begin(), values.end()};
+  Bytes bytes(2 * values.size());
+  std::memcpy(bytes.data(), values.data(), bytes.size());
+  return bytes;
+}
+
+Samples pattern(std::uint32_t width, std::uint32_t height, int channels, int bits) {
+  Samples samples{width, height, channels, bits};
+  std::mt19937 random(width * 31 + height);
+  const std::size_t count = std::size_t{width} * height * static_cast<std::size_t>(channels);
+  for (std::size_t i = 0; i < count; ++i)
+    samples.values.push_back(static_cast<std::uint16_t>(random() & ((1U << bits) - 1)));
+  return samples;
+}
+
+Bytes pngOf(const Samples& samples, bool is_interlaced, const PngColours& colours) {
+  Bytes bytes;
+  png_structp png = png_create_write_struct(
+      PNG_LIBPNG_VER_STRING, nullptr,
+      [](png_structp, png_const_charp text) { throw std::runtime_error(text); },
+      [](png_structp, png_const_charp) {});
+  png_infop info = png_create_info_struct(png);
+  png_set_write_fn(
+      png, &bytes,
+      [](png_structp writer, png_bytep data, std::size_t size) {
+        auto& out = *static_cast<Bytes*>(png_get_io_ptr(writer));
+        out.insert(out.end(), data, data + size);
+      },
+      [](png_structp) {});
+  constexpr std::array<int, 5> kinds{0, PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA,
+                                     PNG_COLOR_TYPE_RGB, PNG_COLOR_TYPE_RGB_ALPHA};
+  png_set_IHDR(png, info, samples.width, samples.height, samples.bits,
+               kinds[static_cast<std::size_t>(samples.channels)],
+               is_interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  if (colours.gamma != 0) png_set_gAMA(png, info, colours.gamma);
+  const auto& xy = colours.chromaticities;
+  if (xy[0] != 0) png_set_cHRM(png, info, xy[0], xy[1], xy[2], xy[3], xy[4], xy[5], xy[6], xy[7]);
+  if (colours.is_srgb) png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+  if (!colours.icc_profile.empty())
+    png_set_iCCP(png, info, "made", 0, colours.icc_profile.data(),
+                 static_cast<png_uint_32>(colours.icc_profile.size()));
+  png_write_info(png, info);
+  if (samples.bits == 16) png_set_swap(png);
+  Bytes packed = samples.packed();
+  std::vector<png_bytep> rows;
+  for (std::size_t y = 0; y < samples.height; ++y)
+    rows.push_back(packed.data() + y * (packed.size() / samples.height));
+  png_write_image(png, rows.data());
+  png_write_end(png, info);
+  png_destroy_write_struct(&png, &info);
+  return bytes;
+}
+
+namespace {
+
+Bytes bytesOf(cmsHPROFILE profile) {
+  cmsUInt32Number size = 0;
+  cmsSaveProfileToMem(profile, nullptr, &size);
+  Bytes bytes(size);
+  cmsSaveProfileToMem(profile, bytes.data(), &size);
+  cmsCloseProfile(profile);
+  return bytes;
+}
+
+constexpr cmsCIExyY d65{0.3127, 0.3290, 1};
+
+}  // namespace
+
+Bytes swappedProfile(double gamma) {
+  cmsToneCurve* curve = cmsBuildGamma(nullptr, gamma);
+  const std::array<cmsToneCurve*, 3> curves{curve, curve, curve};
+  const cmsCIExyYTRIPLE primaries{{0.30, 0.60, 1}, {0.15, 0.06, 1}, {0.64, 0.33, 1}};
+  Bytes bytes = bytesOf(cmsCreateRGBProfile(&d65, &primaries, curves.data()));
+  cmsFreeToneCurve(curve);
+  return bytes;
+}
+
+Bytes greyProfile(double gamma) {
+  cmsToneCurve* curve = cmsBuildGamma(nullptr, gamma);
+  Bytes bytes = bytesOf(cmsCreateGrayProfile(&d65, curve));
+  cmsFreeToneCurve(curve);
+  return bytes;
+}
+
+namespace {
+
+struct TableSampler {
+  cmsHTRANSFORM to_lab;
+  int channels;
+};
+
+cmsInt32Number sampleTable(const cmsUInt16Number* in, cmsUInt16Number* out, void* cargo) {
+  const auto& sampler = *static_cast<TableSampler*>(cargo);
+  const auto share = [&](int i) { return in[i] / 65535.0; };
+  std::array<double, 3> light{share(1), share(2), share(0)};
+  for (int i = 0; sampler.channels == 4 && i < 3; ++i)
+    light[static_cast<std::size_t>(i)] = (1 - share(i)) * (1 - share(3));
+  cmsCIELab lab;
+  cmsDoTransform(sampler.to_lab, light.data(), &lab, 1);
+  cmsFloat2LabEncoded(out, &lab);
+  return 1;
+}
+
+}  // namespace
+
+Bytes tableProfile(int channels) {
+  cmsToneCurve* curve = cmsBuildGamma(nullptr, 1);
+  const std::array<cmsToneCurve*, 3> curves{curve, curve, curve};
+  const cmsCIExyYTRIPLE primaries{{0.64, 0.33, 1}, {0.30, 0.60, 1}, {0.15, 0.06, 1}};
+  cmsHPROFILE rgb = cmsCreateRGBProfile(&d65, &primaries, curves.data());
+  cmsHPROFILE lab = cmsCreateLab4Profile(nullptr);
+  TableSampler sampler{cmsCreateTransform(rgb, TYPE_RGB_DBL, lab, TYPE_Lab_DBL,
+                                          INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOOPTIMIZE),
+                       channels};
+  const auto inputs = static_cast<cmsUInt32Number>(channels);
+  cmsPipeline* pipeline = cmsPipelineAlloc(nullptr, inputs, 3);
+  cmsStage* table = cmsStageAllocCLut16bit(nullptr, channels == 4 ? 13 : 33, inputs, 3, nullptr);
+  cmsStageSampleCLut16bit(table, sampleTable, &sampler, 0);
+  cmsPipelineInsertStage(pipeline, cmsAT_BEGIN, cmsStageAllocToneCurves(nullptr, inputs, nullptr));
+  cmsPipelineInsertStage(pipeline, cmsAT_END, table);
+  cmsPipelineInsertStage(pipeline, cmsAT_END, cmsStageAllocToneCurves(nullptr, 3, nullptr));
+
+  cmsHPROFILE profile = cmsCreateProfilePlaceholder(nullptr);
+  cmsSetProfileVersion(profile, 4.3);
+  cmsSetDeviceClass(profile, cmsSigOutputClass);
+  cmsSetColorSpace(profile, channels == 4 ? cmsSigCmykData : cmsSigRgbData);
+  cmsSetPCS(profile, cmsSigLabData);
+  cmsWriteTag(profile, cmsSigMediaWhitePointTag, cmsD50_XYZ());
+  cmsWriteTag(profile, cmsSigAToB0Tag, pipeline);
+  cmsWriteTag(profile, cmsSigAToB1Tag, pipeline);
+  cmsPipelineFree(pipeline);
+  cmsDeleteTransform(sampler.to_lab);
+  cmsCloseProfile(rgb);
+  cmsCloseProfile(lab);
+  cmsFreeToneCurve(curve);
+  return bytesOf(profile);
+}
+
+double srgbToLinear(double encoded) {
+  return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+std::string textOf(const Bytes& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+Texture decoded(const Bytes& bytes, TextureOpacity opacity) {
+  return decodeTexture(textOf(bytes), "texture 'a'", opacity);
+}
+
+std::string textureRefusal(const Bytes& bytes) {
+  try {
+    decoded(bytes);
+    return "read";
+  } catch (const DataError& error) {
+    return error.what();
+  }
+}
+
+void expectTexels(const Texture& texture, std::uint32_t width, std::uint32_t height,
+                  const std::function<Colour(std::uint32_t x, std::uint32_t y)>& expected,
+                  double tolerance) {
+  ASSERT_EQ(texture.width, width);
+  ASSERT_EQ(texture.height, height);
+  ASSERT_EQ(texture.texels.size(), std::size_t{width} * height);
+  for (std::uint32_t y = 0; y < height; ++y) {
     for (std::uint32_t x = 0; x < width; ++x) {
-      Vec4d value = colour(x, y);
-      for (int c = 0; c < 3; ++c) value[c] *= value[3];
-      Texture::Texel& texel = texture.texels.emplace_back();
-      for (int c = 0; c < 4; ++c)
-        texel[static_cast<std::size_t>(c)] =
-            static_cast<std::uint16_t>(std::lround(value[c] * 65535));
+      const Colour colour = expected(x, y);
+      const Texture::Texel& texel = texture.texels[std::size_t{y} * width + x];
+      for (std::size_t i = 0; i < 4; ++i) {
+        const double wanted = i == 3 ? colour[3] : colour[i] * colour[3];
+        ASSERT_NEAR(texel[i] / 65535.0, wanted, tolerance)
+            << "channel " << i << " at " << x << ", " << y;
+      }
     }
-  return texture;
+  }
 }
 
-Texture checkers(std::uint32_t width, std::uint32_t height, std::uint32_t edge) {
-  return makeTexture(width, height, [edge](std::uint32_t x, std::uint32_t y) {
-    return (x / edge + y / edge) % 2 == 0 ? Vec4d(0.9, 0.2, 0.1, 1) : Vec4d(0.1, 0.3, 0.8, 1);
-  });
+namespace {
+
+void expectOneLine(const std::string& message) {
+  EXPECT_TRUE(message.starts_with("texture 'a' ")) << message;
+  EXPECT_EQ(message.find('\n'), std::string::npos) << message;
 }
 
-Vec4d textureAt(const Texture& texture, double u, double v,
-                const std::array<TextureWrap, 2>& wrap) {
-  const auto placeOf = [](long at, long size, TextureWrap mode) {
-    if (mode == TextureWrap::clamp) return std::min(std::max(at, 0L), size - 1);
-    const long turn = at >= 0 ? at / size : -((size - 1 - at) / size);
-    const long within = at - turn * size;
-    return mode == TextureWrap::mirror && turn % 2 != 0 ? size - 1 - within : within;
-  };
-  const double x = u * texture.width - 0.5;
-  const double y = v * texture.height - 0.5;
-  Vec4d sum(0, 0, 0, 0);
-  for (const long column : {std::lround(std::floor(x)), std::lround(std::floor(x)) + 1})
-    for (const long row : {std::lround(std::floor(y)), std::lround(std::floor(y)) + 1}) {
-      const double share = (1 - std::abs(x - static_cast<double>(column))) *
-                           (1 - std::abs(y - static_cast<double>(row)));
-      const long at = placeOf(row, texture.height, wrap[1]) * texture.width +
-                      placeOf(column, texture.width, wrap[0]);
-      for (std::size_t c = 0; c < 4; ++c)
-        sum[static_cast<int>(c)] +=
-            share * texture.texels[static_cast<std::size_t>(at)][c] / 65535.0;
+}  // namespace
+
+void expectPrefixesAreRefused(const Bytes& bytes, bool may_end_early) {
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    const std::string message =
+        textureRefusal({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)});
+    if (message == "read" && may_end_early) continue;
+    ASSERT_NE(message, "read") << size << " of " << bytes.size();
+    expectOneLine(message);
+  }
+}
+
+void expectSpoiltImagesAreReadOrRefused(const Bytes& bytes, int rounds) {
+  std::mt19937 random(7);
+  for (int round = 0; round < rounds; ++round) {
+    Bytes spoilt = bytes;
+    for (std::uint32_t i = 0; i <= random() % 4; ++i)
+      spoilt[random() % spoilt.size()] = static_cast<std::uint8_t>(random());
+    try {
+      const Texture texture = decoded(spoilt);
+      EXPECT_EQ(texture.texels.size(), std::size_t{texture.width} * texture.height);
+      for (const Texture::Texel& texel : texture.texels) {
+        for (std::size_t i = 0; i < 3; ++i) ASSERT_LE(texel[i], texel[3]);
+      }
+    } catch (const DataError& error) {
+      expectOneLine(error.what());
     }
-  return sum;
-}
-
-void paintCorners(Mesh& mesh, const std::function<Vec4f(const Vec3d&)>& colour) {
-  Appearance appearance;
-  appearance.materials.emplace_back();
-  appearance.material.assign(mesh.triangles.size(), 0);
-  for (const Mesh::Triangle& t : mesh.triangles)
-    appearance.colours.push_back(
-        {colour(mesh.vertices[t[0]]), colour(mesh.vertices[t[1]]), colour(mesh.vertices[t[2]])});
-  mesh.appearance = std::make_shared<Appearance>(std::move(appearance));
-}
-
-void wrapIn(Mesh& mesh, Texture texture, const std::function<Vec2f(const Vec3d&)>& coordinates,
-            SurfaceMaterial material) {
-  Appearance appearance;
-  appearance.textures.push_back(std::move(texture));
-  material.texture = 0;
-  appearance.materials.push_back(std::move(material));
-  appearance.material.assign(mesh.triangles.size(), 0);
-  for (const Mesh::Triangle& t : mesh.triangles)
-    appearance.coordinates.push_back({coordinates(mesh.vertices[t[0]]),
-                                      coordinates(mesh.vertices[t[1]]),
-                                      coordinates(mesh.vertices[t[2]])});
-  mesh.appearance = std::make_shared<Appearance>(std::move(appearance));
+  }
 }
 
 }  // namespace vdbdither::test

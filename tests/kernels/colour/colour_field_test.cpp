@@ -13,7 +13,7 @@
 #include "ops/kernels/leaf/part_index.h"
 #include "ops/kernels/mesh/mesh_measures.h"
 #include "tests/support/shapes.h"
-#include "tests/support/textures.h"
+#include "tests/support/painted_meshes.h"
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/layers.h"
 

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/textures.h"
+#include "tests/support/painted_meshes.h"
 
 namespace vdbdither {
 namespace {
