@@ -12,6 +12,7 @@
 #include <ImfOutputFile.h>
 #include <ImfTiledOutputFile.h>
 
+#include "io/image/exr_source.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -32,24 +33,6 @@ class MemoryStream : public Imf::OStream {
 
  private:
   std::vector<std::uint8_t>& bytes_;
-  std::size_t position_ = 0;
-};
-
-class MemorySource : public Imf::IStream {
- public:
-  explicit MemorySource(std::span<const std::uint8_t> bytes) : IStream("memory"), bytes_(bytes) {}
-
-  bool read(char data[], int size) override {
-    if (position_ + size > bytes_.size()) throw DataError("is cut short");
-    std::copy_n(bytes_.begin() + static_cast<std::ptrdiff_t>(position_), size, data);
-    position_ += size;
-    return position_ < bytes_.size();
-  }
-  std::uint64_t tellg() override { return position_; }
-  void seekg(std::uint64_t position) override { position_ = position; }
-
- private:
-  std::span<const std::uint8_t> bytes_;
   std::size_t position_ = 0;
 };
 
@@ -115,18 +98,6 @@ class Rows {
   std::vector<std::vector<char>> values_;
 };
 
-/// What a header may make OpenEXR allocate before the size of the picture is known here.
-void limitSizes() {
-  static const bool once = [] {
-    constexpr int widest = 1 << 24;
-    constexpr int largest_tile = 4096;
-    Imf::Header::setMaxImageSize(widest, widest);
-    Imf::Header::setMaxTileSize(largest_tile, largest_tile);
-    return true;
-  }();
-  static_cast<void>(once);
-}
-
 }  // namespace
 
 std::vector<std::uint8_t> encodeExr(std::uint32_t width, std::uint32_t height,
@@ -166,9 +137,9 @@ std::vector<std::uint8_t> encodeExr(std::uint32_t width, std::uint32_t height,
 
 SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel,
                     const SizeCheck& check) {
-  limitSizes();
+  limitExrSizes();
   try {
-    MemorySource source(bytes);
+    ExrSource source(bytes);
     Imf::InputFile file(source, 0);
     const Imath::Box2i window = file.header().dataWindow();
     if (check) {

@@ -2,80 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
-#include <memory>
 #include <string>
-#include <tiffio.h>
 
+#include "io/image/tiff_memory.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 
 namespace {
-
-/// What libtiff takes for a file.
-struct Memory {
-  std::vector<std::uint8_t> bytes;
-  std::size_t position = 0;
-  std::string error;  ///< what libtiff last complained of
-};
-
-Memory& memoryOf(thandle_t handle) { return *static_cast<Memory*>(handle); }
-
-tmsize_t readMemory(thandle_t handle, void* data, tmsize_t size) {
-  Memory& memory = memoryOf(handle);
-  const std::size_t begin = std::min(memory.position, memory.bytes.size());
-  const std::size_t count = std::min<std::size_t>(size, memory.bytes.size() - begin);
-  std::copy_n(memory.bytes.data() + begin, count, static_cast<std::uint8_t*>(data));
-  memory.position = begin + count;
-  return static_cast<tmsize_t>(count);
-}
-
-tmsize_t writeMemory(thandle_t handle, void* data, tmsize_t size) {
-  Memory& memory = memoryOf(handle);
-  const auto end = memory.position + static_cast<std::size_t>(size);
-  if (end > memory.bytes.size()) memory.bytes.resize(end);
-  std::copy_n(static_cast<const std::uint8_t*>(data), size, memory.bytes.data() + memory.position);
-  memory.position = end;
-  return size;
-}
-
-toff_t seekMemory(thandle_t handle, toff_t offset, int whence) {
-  Memory& memory = memoryOf(handle);
-  const std::size_t from = whence == SEEK_SET   ? 0
-                           : whence == SEEK_CUR ? memory.position
-                                                : memory.bytes.size();
-  memory.position = from + offset;
-  return memory.position;
-}
-
-int closeMemory(thandle_t) { return 0; }
-toff_t sizeOfMemory(thandle_t handle) { return memoryOf(handle).bytes.size(); }
-
-int noteError(TIFF*, void* user, const char*, const char* format, va_list arguments) {
-  std::array<char, 256> text{};
-  std::vsnprintf(text.data(), text.size(), format, arguments);
-  static_cast<Memory*>(user)->error = text.data();
-  return 1;
-}
-
-int ignoreWarning(TIFF*, void*, const char*, const char*, va_list) { return 1; }
-
-/// What a header may make libtiff allocate, in bytes.
-constexpr tmsize_t most_at_once = tmsize_t{1} << 28;
-
-using TiffHandle = std::unique_ptr<TIFF, decltype(&TIFFClose)>;
-
-TiffHandle open(Memory& memory, const char* mode) {
-  const std::unique_ptr<TIFFOpenOptions, decltype(&TIFFOpenOptionsFree)> options(
-      TIFFOpenOptionsAlloc(), TIFFOpenOptionsFree);
-  TIFFOpenOptionsSetErrorHandlerExtR(options.get(), noteError, &memory);
-  TIFFOpenOptionsSetWarningHandlerExtR(options.get(), ignoreWarning, nullptr);
-  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), most_at_once);
-  return {TIFFClientOpenExt("memory", mode, &memory, readMemory, writeMemory, seekMemory,
-                            closeMemory, sizeOfMemory, nullptr, nullptr, options.get()),
-          TIFFClose};
-}
 
 /// A row of spans as the bytes of the file.
 void packRow(std::span<const Span> spans, bool bits, std::vector<std::uint8_t>& row) {
@@ -109,9 +43,9 @@ std::vector<std::uint8_t> encodeTiff(const SpanImage& image, const TiffFormat& f
   if (format.palette.size() > 256) throw DataError("a TIFF has at most 256 colours");
   const bool bits = format.palette.empty();
   constexpr double mm_per_cm = 10;
-  Memory memory;
+  TiffMemory memory;
   // Little-endian on every machine.
-  TiffHandle tiff = open(memory, "wl");
+  TiffHandle tiff = openTiff(memory, "wl");
   if (!tiff) throw DataError("cannot make a TIFF: " + memory.error);
   TIFFSetField(tiff.get(), TIFFTAG_IMAGEWIDTH, image.width);
   TIFFSetField(tiff.get(), TIFFTAG_IMAGELENGTH, image.height);
@@ -134,12 +68,13 @@ std::vector<std::uint8_t> encodeTiff(const SpanImage& image, const TiffFormat& f
   }
   tiff.reset();
   if (!memory.error.empty()) throw DataError("cannot make a TIFF: " + memory.error);
-  return std::move(memory.bytes);
+  return std::move(memory.written);
 }
 
 SpanImage decodeTiff(std::span<const std::uint8_t> bytes, const SizeCheck& check) {
-  Memory memory{{bytes.begin(), bytes.end()}, 0, ""};
-  const TiffHandle tiff = open(memory, "r");
+  TiffMemory memory;
+  memory.read = bytes;
+  const TiffHandle tiff = openTiff(memory, "r");
   const auto refuse = [&] { return DataError("is no readable TIFF: it is damaged"); };
   if (!tiff) throw refuse();
   std::uint32_t width = 0;

@@ -28,6 +28,10 @@ constexpr std::string_view production_path =
 constexpr std::string_view triangle_set_space =
     "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07";
 
+/// A part has at most as many elements of each kind that takes much more memory than bytes of the
+/// file.
+constexpr std::size_t most_elements = std::size_t{1} << 18;
+
 struct ThreemfExtension {
   std::string_view word;  ///< of its namespace
   std::string_view name;
@@ -179,7 +183,7 @@ void ThreemfModelReader::open(Tag tag, const XmlElement& element) {
     case Tag::triangle:
       return readTriangle(element);
     case Tag::component:
-      return part_.objects.back().components.push_back(useOf(element));
+      return readComponent(element);
     case Tag::item:
       return readItem(element);
     default:
@@ -195,8 +199,7 @@ void ThreemfModelReader::open(Tag tag, const XmlElement& element) {
       addGroup(element).is_read = false;
       break;
     case Tag::base:
-      group_->materials.push_back(
-          {printable(element.attribute("name").value_or("")), colourOf(element, "displaycolor")});
+      readBaseMaterial(element);
       break;
     case Tag::colour:
       group_->colours.push_back(colourOf(element, "color"));
@@ -244,6 +247,7 @@ void ThreemfModelReader::refuseUnknownExtensions(std::string_view prefixes) cons
 }
 
 void ThreemfModelReader::readObject(const XmlElement& element) {
+  limit(part_.objects.size(), "objects");
   ThreemfObject object;
   object.id = index(element, "id");
   object.name = printable(element.attribute("name").value_or(""));
@@ -256,6 +260,22 @@ void ThreemfModelReader::readObject(const XmlElement& element) {
   if (!part_.object_of_id.emplace(object.id, part_.objects.size()).second)
     refuse("has a second object with the id " + std::to_string(object.id));
   part_.objects.push_back(std::move(object));
+}
+
+void ThreemfModelReader::readComponent(const XmlElement& element) {
+  limit(components_++, "components");
+  part_.objects.back().components.push_back(useOf(element));
+}
+
+void ThreemfModelReader::readBaseMaterial(const XmlElement& element) {
+  limit(group_->materials.size(), "materials in a group");
+  group_->materials.push_back(
+      {printable(element.attribute("name").value_or("")), colourOf(element, "displaycolor")});
+}
+
+void ThreemfModelReader::limit(std::size_t count, const std::string& what) const {
+  if (count >= most_elements)
+    refuse("has more than " + std::to_string(most_elements) + " " + what + "; split it");
 }
 
 void ThreemfModelReader::readVertex(const XmlElement& element) {
@@ -295,6 +315,7 @@ void ThreemfModelReader::readProperty(const XmlElement& element) {
 }
 
 void ThreemfModelReader::readItem(const XmlElement& element) {
+  limit(part_.items.size(), "items to print");
   ThreemfUse use = useOf(element);
   if (element.attribute("printable") == "0") {
     ++part_.left_out;
@@ -331,6 +352,7 @@ ThreemfTransform ThreemfModelReader::transformOf(std::string_view text) const {
 
 ThreemfGroup& ThreemfModelReader::addGroup(const XmlElement& element) {
   const std::uint32_t id = index(element, "id");
+  limit(part_.groups.size(), "property groups");
   const auto [place, is_new] = part_.groups.try_emplace(id);
   if (!is_new) refuse("has a second property group with the id " + std::to_string(id));
   group_ = &place->second;
@@ -355,6 +377,7 @@ ThreemfColour ThreemfModelReader::colourOf(const XmlElement& element, std::strin
 
 void ThreemfModelReader::readTexture(const XmlElement& element) {
   const std::uint32_t id = index(element, "id");
+  limit(part_.textures.size(), "textures");
   ThreemfTexture texture;
   texture.path = element.attribute("path").value_or("");
   constexpr std::array<std::string_view, 2> names{"tilestyleu", "tilestylev"};

@@ -62,6 +62,8 @@ class ThreemfModelReader : public XmlReader {
   void readModel(const XmlElement& element);
   void refuseUnknownExtensions(std::string_view prefixes) const;
   void readObject(const XmlElement& element);
+  void readComponent(const XmlElement& element);
+  void readBaseMaterial(const XmlElement& element);
   void readVertex(const XmlElement& element);
   void readTriangle(const XmlElement& element);
   void readProperty(const XmlElement& element);
@@ -69,6 +71,8 @@ class ThreemfModelReader : public XmlReader {
   void readTexture(const XmlElement& element);
   void readCoordinates(const XmlElement& element);
 
+  /// Refuses to add one to `count` elements that are the maximum.
+  void limit(std::size_t count, const std::string& what) const;
   [[nodiscard]] ThreemfUse useOf(const XmlElement& element) const;
   [[nodiscard]] ThreemfTransform transformOf(std::string_view text) const;
   ThreemfGroup& addGroup(const XmlElement& element);
@@ -85,6 +89,7 @@ class ThreemfModelReader : public XmlReader {
   std::map<std::string, std::string, std::less<>> space_of_prefix_;
   ThreemfGroup* group_ = nullptr;  ///< whose elements are read
   double mm_per_unit_ = 1;
+  std::size_t components_ = 0;
   std::uint64_t records_ = 0;
 };
 
