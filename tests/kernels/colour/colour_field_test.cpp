@@ -12,8 +12,8 @@
 
 #include "ops/kernels/leaf/part_index.h"
 #include "ops/kernels/mesh/mesh_measures.h"
-#include "tests/support/shapes.h"
 #include "tests/support/painted_meshes.h"
+#include "tests/support/shapes.h"
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/layers.h"
 
