@@ -32,6 +32,8 @@ constexpr std::string_view triangle_set_space =
 /// file.
 constexpr std::size_t most_elements = std::size_t{1} << 18;
 
+constexpr std::size_t longest_name = 200;  ///< of objects and materials that is kept, in bytes
+
 struct ThreemfExtension {
   std::string_view word;  ///< of its namespace
   std::string_view name;
@@ -250,7 +252,7 @@ void ThreemfModelReader::readObject(const XmlElement& element) {
   limit(part_.objects.size(), "objects");
   ThreemfObject object;
   object.id = index(element, "id");
-  object.name = printable(element.attribute("name").value_or(""));
+  object.name = shortened(printable(element.attribute("name").value_or("")), longest_name);
   const std::string_view type = element.attribute("type").value_or("model");
   object.is_printed = type == "model" || type == "surface";
   if (colours_ == MeshColours::read) {
@@ -270,7 +272,8 @@ void ThreemfModelReader::readComponent(const XmlElement& element) {
 void ThreemfModelReader::readBaseMaterial(const XmlElement& element) {
   limit(group_->materials.size(), "materials in a group");
   group_->materials.push_back(
-      {printable(element.attribute("name").value_or("")), colourOf(element, "displaycolor")});
+      {shortened(printable(element.attribute("name").value_or("")), longest_name),
+       colourOf(element, "displaycolor")});
 }
 
 void ThreemfModelReader::limit(std::size_t count, const std::string& what) const {

@@ -4,6 +4,9 @@
 #include "io/mesh/xml_reader.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdlib>
 #include <expat.h>
 #include <new>
 #include <utility>
@@ -19,9 +22,49 @@ constexpr int deepest_element = 64;
 /// Each element carries its namespace along.
 constexpr std::size_t longest_space = 256;
 /// A tag is kept whole until it ends.
-constexpr std::uint64_t longest_tag = std::uint64_t{1} << 20;
+constexpr std::uint64_t longest_tag = std::uint64_t{1} << 18;
+/// The parser keeps each name of an element or attribute. Documents have a few dozen.
+constexpr std::size_t most_parser_bytes = std::size_t{32} << 20;
 
 std::string_view viewOf(const char* text) { return text == nullptr ? std::string_view() : text; }
+
+/// What the parsers of this thread hold, in bytes.
+std::size_t& parserBytes() {
+  static thread_local std::size_t bytes = 0;
+  return bytes;
+}
+
+/// In front of each block of a parser.
+struct alignas(std::max_align_t) BlockSize {
+  std::size_t bytes;
+};
+
+void* resizeBlock(void* block, std::size_t bytes) {
+  BlockSize* old = block == nullptr ? nullptr : static_cast<BlockSize*>(block) - 1;
+  const std::size_t old_bytes = old == nullptr ? 0 : old->bytes;
+  if (bytes > most_parser_bytes || parserBytes() - old_bytes + bytes > most_parser_bytes)
+    return nullptr;
+  // NOLINTNEXTLINE(cppcoreguidelines-no-malloc): expat wants what realloc does
+  auto* resized = static_cast<BlockSize*>(std::realloc(old, sizeof(BlockSize) + bytes));
+  if (resized == nullptr) return nullptr;
+  parserBytes() += bytes - old_bytes;
+  resized->bytes = bytes;
+  return resized + 1;
+}
+
+void freeBlock(void* block) {
+  if (block == nullptr) return;
+  BlockSize* old = static_cast<BlockSize*>(block) - 1;
+  parserBytes() -= old->bytes;
+  std::free(old);  // NOLINT(cppcoreguidelines-no-malloc)
+}
+
+XML_Parser createParser() {
+  const XML_Memory_Handling_Suite memory{
+      [](std::size_t bytes) { return resizeBlock(nullptr, bytes); }, resizeBlock, freeBlock};
+  const std::array<char, 2> separator{between_space_and_name, '\0'};
+  return XML_ParserCreate_MM(nullptr, &memory, separator.data());
+}
 
 }  // namespace
 
@@ -86,8 +129,7 @@ struct XmlReader::Callbacks {
 };
 
 XmlReader::XmlReader(std::string shown)
-    : shown_(std::move(shown)),
-      parser_(XML_ParserCreateNS(nullptr, between_space_and_name), XML_ParserFree) {
+    : shown_(std::move(shown)), parser_(createParser(), XML_ParserFree) {
   XML_Parser parser = parser_.get();
   if (parser == nullptr) throw std::bad_alloc();
   XML_SetUserData(parser, this);
@@ -114,12 +156,12 @@ void XmlReader::parse(std::span<const std::uint8_t> bytes, bool is_last) {
   if (status == XML_STATUS_OK) {
     bytes_ += bytes.size();
     const auto understood = static_cast<std::uint64_t>(XML_GetCurrentByteIndex(parser));
-    if (bytes_ > understood + longest_tag) refuse("has a tag of more than 1 MiB");
+    if (bytes_ > understood + longest_tag) refuse("has a tag of more than 256 KiB");
     return;
   }
   switch (XML_GetErrorCode(parser)) {
     case XML_ERROR_NO_MEMORY:
-      throw std::bad_alloc();
+      refuse("has too many different names of elements and attributes; export it again");
     case XML_ERROR_UNKNOWN_ENCODING:
     case XML_ERROR_INCORRECT_ENCODING:
       refuse("is in an encoding that is not read; use UTF-8");
