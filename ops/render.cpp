@@ -14,6 +14,7 @@
 #include "io/image/exr.h"
 #include "io/image/picture.h"
 #include "io/image/png_spans.h"
+#include "io/image/srgb.h"
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "ops/kernels/colour/nearest_colour.h"
@@ -51,13 +52,6 @@ constexpr std::array<Choice<Projection>, 2> projections{
 /// What a horizontal open place becomes where the user does not say: bright, but with room for what
 /// faces the light more.
 double brightnessOf(Look look) { return look == Look::staircase ? 0.2 : 0.6; }
-
-std::uint8_t codedSrgb(double linear) {
-  linear = std::clamp(linear, 0.0, 1.0);
-  const double coded =
-      linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-  return static_cast<std::uint8_t>(std::lround(255 * coded));
-}
 
 Mesh readMeshOf(const std::string& file, Reporter& reporter,
                 MeshColours colours = MeshColours::skip) {
@@ -161,7 +155,7 @@ class SurfacePicture {
       const openvdb::Vec3d light = brightness * openvdb::Vec3d(picture.light[i]);
       const auto cover = static_cast<std::uint8_t>(std::lround(255 * picture.cover[i]));
       coded.pixels.push_back(
-          rgba(codedSrgb(light.x()), codedSrgb(light.y()), codedSrgb(light.z()), cover));
+          rgba(srgbByteOf(light.x()), srgbByteOf(light.y()), srgbByteOf(light.z()), cover));
     }
     return encodePicture(coded);
   }
