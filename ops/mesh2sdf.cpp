@@ -6,6 +6,8 @@
 #include <span>
 #include <utility>
 
+#include "io/file/whole_file.h"
+#include "io/image/texture.h"
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/profile/size_question.h"
@@ -62,6 +64,9 @@ class MeshToSdf : public Source {
                  "opacity. Voxels from one diameter outside to --colour-depth inside have them");
     options.length("colour-depth", colour_depth_mm_, {0, 1000},
                    "How far below the surface voxels have a colour");
+    options.file("texture", texture_file_, "FILE",
+                 "Image for the meshes that have texture coordinates but name no image of their "
+                 "own; needs --colour");
     options.choice("overlap", part_order_, overlaps,
                    "To which part a voxel belongs that lies in several, and whose colour it has");
   }
@@ -214,16 +219,32 @@ class MeshToSdf : public Source {
 
   std::vector<Mesh> readFiles() {
     std::vector<Mesh> files;
-    bool coloured = false;
-    for (const std::string& path : paths_) {
+    for (const std::string& path : paths_)
       files.push_back(readMesh(
           path, [this](const std::string& text) { report().warn(text); },
           colour_ ? MeshColours::read : MeshColours::skip));
-      coloured = coloured || files.back().appearance;
-    }
-    if (colour_ && !coloured)
+    if (!texture_file_.empty()) addTexture(files);
+    const auto has_colours = [](const Mesh& mesh) {
+      return mesh.appearance && mesh.appearance->hasColours();
+    };
+    if (colour_ && std::none_of(files.begin(), files.end(), has_colours))
       report().warn("--colour: no mesh has colours; all voxels become white");
     return files;
+  }
+
+  void addTexture(std::vector<Mesh>& files) const {
+    if (!colour_) throw UsageError("--texture needs --colour");
+    const std::string shown = inQuotes(texture_file_);
+    const std::vector<std::uint8_t> bytes = readWholeFile(texture_file_, shown, most_texture_bytes);
+    const Texture texture =
+        decodeTexture({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, shown);
+    bool used = false;
+    for (Mesh& file : files) {
+      if (!file.appearance || file.appearance->coordinates.empty()) continue;
+      used = true;
+      file.appearance = std::make_shared<Appearance>(textured(*file.appearance, texture));
+    }
+    if (!used) throw UsageError("--texture: no mesh has texture coordinates; leave it out");
   }
 
   std::vector<Mesh> partsOfAll(std::vector<Mesh> files) const {
@@ -318,6 +339,7 @@ class MeshToSdf : public Source {
   DistanceExtras extras_;
   bool colour_ = false;
   double colour_depth_mm_ = 1;
+  std::string texture_file_;
   PartOrder part_order_ = PartOrder::first;
 
   Band band_;
