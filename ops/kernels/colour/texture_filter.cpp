@@ -5,6 +5,7 @@
 #include "ops/kernels/colour/texture_filter.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include <tbb/parallel_for.h>
@@ -83,36 +84,53 @@ std::uint32_t wrapped(std::int64_t at, std::uint32_t size, TextureWrap wrap) {
   return static_cast<std::uint32_t>(within < count ? within : period - 1 - within);
 }
 
-/// Coordinates far outside of the texture, of which nothing meaningful is left, stay in range.
+/// The largest whole number that is not above `at`. Coordinates far outside of the texture, of
+/// which nothing meaningful is left, stay in range.
 std::int64_t wholeOf(double at) {
   constexpr double far = 1e15;
-  return static_cast<std::int64_t>(std::clamp(at, -far, far));
+  at = std::clamp(at, -far, far);
+  const auto whole = static_cast<std::int64_t>(at);
+  return whole - (static_cast<double>(whole) > at ? 1 : 0);
 }
 
-Vec4f texelAt(const Texture& image, std::int64_t x, std::int64_t y,
-              const std::array<TextureWrap, 2>& wrap) {
-  const Texture::Texel& texel =
-      image.texels[std::size_t{wrapped(y, image.height, wrap[1])} * image.width +
-                   wrapped(x, image.width, wrap[0])];
-  return {static_cast<float>(texel[0]), static_cast<float>(texel[1]), static_cast<float>(texel[2]),
-          static_cast<float>(texel[3])};
+/// Red, green, blue and the opacity, in parts of 65535.
+using Colour = float __attribute__((vector_size(16)));
+
+Colour colourOf(const Texture::Texel& texel) {
+  using Parts = std::uint16_t __attribute__((vector_size(8)));
+  return __builtin_convertvector(std::bit_cast<Parts>(texel), Colour);
 }
 
-Vec4f interpolated(const Texture& image, double u, double v,
-                   const std::array<TextureWrap, 2>& wrap) {
+Colour texelAt(const Texture& image, std::int64_t x, std::int64_t y,
+               const std::array<TextureWrap, 2>& wrap) {
+  return colourOf(image.texels[std::size_t{wrapped(y, image.height, wrap[1])} * image.width +
+                               wrapped(x, image.width, wrap[0])]);
+}
+
+Colour interpolated(const Texture& image, double u, double v,
+                    const std::array<TextureWrap, 2>& wrap) {
   const double x = u * image.width - 0.5;
   const double y = v * image.height - 0.5;
-  const double left = std::floor(x);
-  const double top = std::floor(y);
-  const auto right_share = static_cast<float>(x - left);
-  const auto bottom_share = static_cast<float>(y - top);
-  const std::int64_t column = wholeOf(left);
-  const std::int64_t row = wholeOf(top);
-  const Vec4f upper = texelAt(image, column, row, wrap) * (1 - right_share) +
-                      texelAt(image, column + 1, row, wrap) * right_share;
-  const Vec4f lower = texelAt(image, column, row + 1, wrap) * (1 - right_share) +
-                      texelAt(image, column + 1, row + 1, wrap) * right_share;
-  return upper * (1 - bottom_share) + lower * bottom_share;
+  const std::int64_t column = wholeOf(x);
+  const std::int64_t row = wholeOf(y);
+  const auto right = static_cast<float>(x - static_cast<double>(column));
+  const auto lower = static_cast<float>(y - static_cast<double>(row));
+  std::array<Colour, 4> corners;
+  const bool is_within = column >= 0 && column + 1 < std::int64_t{image.width} && row >= 0 &&
+                         row + 1 < std::int64_t{image.height};
+  if (is_within) {
+    const Texture::Texel* texel = image.texels.data() +
+                                  static_cast<std::size_t>(row) * image.width +
+                                  static_cast<std::size_t>(column);
+    corners = {colourOf(texel[0]), colourOf(texel[1]), colourOf(texel[image.width]),
+               colourOf(texel[image.width + 1])};
+  } else {
+    corners = {texelAt(image, column, row, wrap), texelAt(image, column + 1, row, wrap),
+               texelAt(image, column, row + 1, wrap), texelAt(image, column + 1, row + 1, wrap)};
+  }
+  const Colour above = corners[0] * (1 - right) + corners[1] * right;
+  const Colour below = corners[2] * (1 - right) + corners[3] * right;
+  return above * (1 - lower) + below * lower;
 }
 
 }  // namespace
@@ -179,20 +197,21 @@ Vec4f FilteredTexture::sample(const Vec2f& at, const TextureFootprint& footprint
                               const std::array<TextureWrap, 2>& wrap, bool is_smooth) const {
   const Texture& image = level(footprint.level);
   const bool is_interpolated = is_smooth || footprint.level > 0;
-  Vec4f sum(0, 0, 0, 0);
+  Colour sum{};
   for (int i = 0; i < footprint.samples[0]; ++i) {
     const double along = (i + 0.5) / footprint.samples[0] - 0.5;
     for (int j = 0; j < footprint.samples[1]; ++j) {
       const double across = (j + 0.5) / footprint.samples[1] - 0.5;
       const double u = at.x() + footprint.side[0].x() * along + footprint.side[1].x() * across;
       const double v = at.y() + footprint.side[0].y() * along + footprint.side[1].y() * across;
-      sum += is_interpolated ? interpolated(image, u, v, wrap)
-                             : texelAt(image, wholeOf(std::floor(u * image.width)),
-                                       wholeOf(std::floor(v * image.height)), wrap);
+      sum += is_interpolated
+                 ? interpolated(image, u, v, wrap)
+                 : texelAt(image, wholeOf(u * image.width), wholeOf(v * image.height), wrap);
     }
   }
   constexpr float whole = 65535;
-  return sum / (whole * static_cast<float>(footprint.samples[0] * footprint.samples[1]));
+  sum /= whole * static_cast<float>(footprint.samples[0] * footprint.samples[1]);
+  return {sum[0], sum[1], sum[2], sum[3]};
 }
 
 }  // namespace vdbdither
