@@ -41,13 +41,19 @@ double straightValueOf(Sample sample, double opacity) {
 }
 
 /// Linear light by sample, for this many samples.
-std::vector<double> curveOf(const ColourSpace& space, std::size_t count) {
+std::vector<double> curveOf(const std::optional<double>& exponent, std::size_t count) {
   std::vector<double> curve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double encoded = static_cast<double>(i) / static_cast<double>(count - 1);
-    curve[i] = space.exponent ? std::pow(encoded, *space.exponent) : linearOfSrgb(encoded);
+    curve[i] = exponent ? std::pow(encoded, *exponent) : linearOfSrgb(encoded);
   }
   return curve;
+}
+
+/// The same; that of sRGB is made once.
+std::vector<double> fineCurveOf(const std::optional<double>& exponent) {
+  static const std::vector<double> srgb = curveOf(std::nullopt, 65536);
+  return exponent ? curveOf(exponent, 65536) : srgb;
 }
 
 }  // namespace
@@ -63,7 +69,7 @@ TextureBuilder::TextureBuilder(std::uint32_t width, std::uint32_t height,
   if (transform_ != nullptr || layout.type == SampleLayout::Type::real) return;
   const bool has_other_values = layout.type == SampleLayout::Type::word || layout.colours == 4 ||
                                 layout.opacity == SampleLayout::Opacity::associated;
-  curve_ = curveOf(space, has_other_values ? 65536 : 256);
+  curve_ = has_other_values ? fineCurveOf(space.exponent) : curveOf(space.exponent, 256);
   for (std::size_t i = 0; !has_other_values && i < 256; ++i)
     opaque_curve_.push_back(shareOf(curve_[i]));
 }
