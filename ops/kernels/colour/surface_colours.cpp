@@ -6,6 +6,7 @@
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/colour/corner_weights.h"
+#include "ops/kernels/colour/texture_coverage.h"
 
 namespace vdbdither {
 
@@ -33,6 +34,19 @@ bool isLessThanOpaque(const Appearance& appearance) {
                      });
 }
 
+/// The texels of every texture that triangles show.
+std::vector<TextureCoverage> coveragesOf(const Appearance& appearance) {
+  std::vector<TextureCoverage> coverages;
+  for (const Texture& texture : appearance.textures)
+    coverages.emplace_back(texture.width, texture.height);
+  for (std::size_t t = 0; t < appearance.coordinates.size(); ++t) {
+    const SurfaceMaterial& material = appearance.materials[appearance.material[t]];
+    if (material.texture != SurfaceMaterial::no_texture)
+      coverages[material.texture].add(appearance.coordinates[t], material.wrap);
+  }
+  return coverages;
+}
+
 }  // namespace
 
 SurfaceColours::SurfaceColours(std::span<const Mesh> meshes, const Vec3d& pitch_mm) {
@@ -51,8 +65,9 @@ void SurfaceColours::add(const Mesh& mesh) {
   source.appearance = mesh.appearance;
   source.first = static_cast<std::uint32_t>(triangles_.size());
   if (source.appearance) {
-    for (const Texture& texture : source.appearance->textures)
-      source.textures.emplace_back(texture);
+    const std::vector<TextureCoverage> coverages = coveragesOf(*source.appearance);
+    for (std::size_t n = 0; n < coverages.size(); ++n)
+      source.textures.emplace_back(source.appearance->textures[n], coverages[n].shown());
     has_opacity_ = has_opacity_ || isLessThanOpaque(*source.appearance);
   }
   const auto first = static_cast<std::uint32_t>(vertices_.size());

@@ -7,8 +7,11 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include <tbb/parallel_for.h>
+
+#include "ops/kernels/colour/texture_coverage.h"
 
 namespace vdbdither {
 
@@ -50,38 +53,46 @@ std::uint64_t shareOf(const Cover& cover, std::uint32_t at) {
 }
 
 /// Returns the image with half as many texels along each side, rounded up.
-Texture halved(const Texture& image) {
+/// @param weights  of the texels; becomes that of the texels of the result
+Texture halved(const Texture& image, std::vector<std::uint8_t>& weights) {
   Texture half;
   half.width = (image.width + 1) / 2;
   half.height = (image.height + 1) / 2;
   half.texels.resize(std::size_t{half.width} * half.height);
+  std::vector<std::uint8_t> half_weights(half.texels.size());
   const std::uint64_t area = std::uint64_t{image.width} * image.height;
   tbb::parallel_for(std::uint32_t{0}, half.height, [&](std::uint32_t y) {
     const Cover rows = coverOf(y, image.height, half.height);
     for (std::uint32_t x = 0; x < half.width; ++x) {
       const Cover columns = coverOf(x, image.width, half.width);
       std::array<std::uint64_t, 4> sum{};
+      std::uint64_t weight = 0;
       for (std::uint32_t row = rows.begin; row < rows.end; ++row)
         for (std::uint32_t column = columns.begin; column < columns.end; ++column) {
-          const std::uint64_t share = shareOf(rows, row) * shareOf(columns, column);
-          const Texture::Texel& texel = image.texels[std::size_t{row} * image.width + column];
-          for (std::size_t c = 0; c < 4; ++c) sum[c] += share * texel[c];
+          const std::size_t at = std::size_t{row} * image.width + column;
+          const std::uint64_t share = shareOf(rows, row) * shareOf(columns, column) * weights[at];
+          weight += share;
+          for (std::size_t c = 0; c < 4; ++c) sum[c] += share * image.texels[at][c];
         }
-      Texture::Texel& made = half.texels[std::size_t{y} * half.width + x];
+      if (weight == 0) continue;
+      const std::size_t made = std::size_t{y} * half.width + x;
       for (std::size_t c = 0; c < 4; ++c)
-        made[c] = static_cast<std::uint16_t>((sum[c] + area / 2) / area);
+        half.texels[made][c] = static_cast<std::uint16_t>((sum[c] + weight / 2) / weight);
+      half_weights[made] = static_cast<std::uint8_t>(std::max<std::uint64_t>(1, weight / area));
     }
   });
+  weights = std::move(half_weights);
   return half;
 }
 
-std::uint32_t wrapped(std::int64_t at, std::uint32_t size, TextureWrap wrap) {
-  const std::int64_t count = size;
-  if (at >= 0 && at < count) return static_cast<std::uint32_t>(at);
-  if (wrap == TextureWrap::clamp) return at < 0 ? 0 : size - 1;
-  const std::int64_t period = wrap == TextureWrap::mirror ? 2 * count : count;
-  const std::int64_t within = (at % period + period) % period;
-  return static_cast<std::uint32_t>(within < count ? within : period - 1 - within);
+/// Gives texels without a weight the colour of the smaller copy.
+void fillFrom(const Texture& smaller, const std::vector<std::uint8_t>& weights, Texture& image) {
+  for (std::uint32_t y = 0; y < image.height; ++y)
+    for (std::uint32_t x = 0; x < image.width; ++x) {
+      const std::size_t at = std::size_t{y} * image.width + x;
+      if (weights[at] == 0)
+        image.texels[at] = smaller.texels[std::size_t{y / 2} * smaller.width + x / 2];
+    }
 }
 
 /// The largest whole number that is not above `at`. Coordinates far outside of the texture, of
@@ -103,8 +114,8 @@ Colour colourOf(const Texture::Texel& texel) {
 
 Colour texelAt(const Texture& image, std::int64_t x, std::int64_t y,
                const std::array<TextureWrap, 2>& wrap) {
-  return colourOf(image.texels[std::size_t{wrapped(y, image.height, wrap[1])} * image.width +
-                               wrapped(x, image.width, wrap[0])]);
+  return colourOf(image.texels[std::size_t{wrappedTexel(y, image.height, wrap[1])} * image.width +
+                               wrappedTexel(x, image.width, wrap[0])]);
 }
 
 Colour interpolated(const Texture& image, double u, double v,
@@ -135,9 +146,17 @@ Colour interpolated(const Texture& image, double u, double v,
 
 }  // namespace
 
-FilteredTexture::FilteredTexture(const Texture& texture) : texture_(&texture) {
-  while (level(smaller_.size()).width > 1 || level(smaller_.size()).height > 1)
-    smaller_.push_back(halved(level(smaller_.size())));
+FilteredTexture::FilteredTexture(const Texture& texture, const std::vector<std::uint8_t>& shown)
+    : texture_(&texture) {
+  std::vector<std::vector<std::uint8_t>> weights;
+  std::vector<std::uint8_t> last =
+      shown.empty() ? std::vector<std::uint8_t>(texture.texels.size(), 255) : shown;
+  while (level(smaller_.size()).width > 1 || level(smaller_.size()).height > 1) {
+    smaller_.push_back(halved(level(smaller_.size()), last));
+    weights.push_back(last);
+  }
+  for (std::size_t n = smaller_.size(); n-- > 1;)
+    fillFrom(smaller_[n], weights[n - 1], smaller_[n - 1]);
 }
 
 double FilteredTexture::memoryBytes() const {

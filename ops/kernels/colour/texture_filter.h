@@ -26,8 +26,10 @@ struct TextureFootprint {
 /// transparent and opaque texels are right, because texels are multiplied by their opacity.
 class FilteredTexture {
  public:
-  /// `texture` must outlive the object.
-  explicit FilteredTexture(const Texture& texture);
+  /// @param texture  must outlive the object
+  /// @param shown    see TextureCoverage; averages of texels that are shown leave out the others.
+  ///                 Empty if all are shown
+  explicit FilteredTexture(const Texture& texture, const std::vector<std::uint8_t>& shown = {});
 
   /// Returns how to average over the box that `edges` span, seen on the surface: `edges` are the
   /// changes of (u, v) along its three edges. The parallelogram has the same extent and direction

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "ops/kernels/colour/texture_coverage.h"
 #include "tests/support/painted_meshes.h"
 
 namespace vdbdither {
@@ -119,6 +121,49 @@ TEST(TextureFilter, CopiesHaveTheExactMeanOfOddSizes) {
   const TextureFootprint footprint = filtered.footprint(everything);
   EXPECT_EQ(footprint.level, 6);
   EXPECT_LT(difference(filtered.sample({0.3F, 0.8F}, footprint, repeated, true), mean), 1e-4);
+}
+
+TEST(TextureFilter, WhatNoTriangleShowsIsNotAveraged) {
+  // Charts of 24 texels in black.
+  const Texture atlas = makeTexture(128, 128, [](std::uint32_t x, std::uint32_t y) {
+    return x % 32 < 24 && y % 32 < 24 ? Vec4d(0.8, 0.6, 0.4, 1) : Vec4d(0, 0, 0, 1);
+  });
+  TextureCoverage coverage(128, 128);
+  for (float x = 0; x < 1; x += 0.25F)
+    for (float y = 0; y < 1; y += 0.25F) {
+      // The neighbours of texels at the border are shown too.
+      const Vec2f low(x + 2 / 128.0F, y + 2 / 128.0F);
+      const Vec2f high(x + 22 / 128.0F, y + 22 / 128.0F);
+      coverage.add({low, Vec2f(high.x(), low.y()), high}, repeated);
+      coverage.add({low, high, Vec2f(low.x(), high.y())}, repeated);
+    }
+  const FilteredTexture aware(atlas, coverage.shown());
+  const FilteredTexture unaware(atlas);
+  const auto footprint = aware.footprint({Vec2d(0.15, 0), Vec2d(0, 0.15), Vec2d(0, 0)});
+  ASSERT_GT(footprint.level, 0);
+  const Vec2f corner(2 / 128.0F, 2 / 128.0F);
+  EXPECT_LT(difference(aware.sample(corner, footprint, repeated, true), Vec4d(0.8, 0.6, 0.4, 1)),
+            1e-3);
+  EXPECT_GT(difference(unaware.sample(corner, footprint, repeated, true), Vec4d(0.8, 0.6, 0.4, 1)),
+            0.2);
+}
+
+TEST(TextureFilter, ShownTexelsAreThoseOfTheTriangleAndTheirNeighbours) {
+  TextureCoverage coverage(12, 8);
+  coverage.add({Vec2f(4 / 12.0F, 2 / 8.0F), Vec2f(8 / 12.0F, 2 / 8.0F), Vec2f(4 / 12.0F, 6 / 8.0F)},
+               repeated);
+  std::string picture;
+  for (std::size_t n = 0; n < coverage.shown().size(); ++n)
+    picture += std::string(coverage.shown()[n] != 0 ? "#" : ".") + (n % 12 == 11 ? "\n" : "");
+  EXPECT_EQ(picture,
+            "............\n"
+            "...#######..\n"
+            "...#######..\n"
+            "...#######..\n"
+            "...######...\n"
+            "...#####....\n"
+            "...####.....\n"
+            "...###......\n");
 }
 
 TEST(TextureFilter, TransparentTexelsDoNotColourOthers) {
