@@ -2,23 +2,11 @@
 
 #include "io/image/colour_space.h"
 
+#include <algorithm>
 #include <cmath>
 #include <lcms2.h>
 
 namespace vdbdither {
-
-struct ColourTransform::Handles {
-  cmsContext context = nullptr;
-  cmsHTRANSFORM transform = nullptr;
-
-  Handles() = default;
-  Handles(const Handles&) = delete;
-  Handles& operator=(const Handles&) = delete;
-  ~Handles() {
-    if (transform != nullptr) cmsDeleteTransform(transform);
-    if (context != nullptr) cmsDeleteContext(context);
-  }
-};
 
 namespace {
 
@@ -90,46 +78,157 @@ cmsHPROFILE profileOf(cmsContext context, const ColourSpace& space) {
 
 }  // namespace
 
-std::unique_ptr<ColourTransform> ColourTransform::make(const ColourSpace& space, int channels) {
-  if (space.icc_profile.empty() && (!space.chromaticities || channels == 4)) return nullptr;
-  auto handles = std::make_unique<Handles>();
-  handles->context = cmsCreateContext(nullptr, nullptr);
-  if (handles->context == nullptr) return nullptr;
-  // A broken profile is passed over without a word to the error stream.
-  cmsSetLogErrorHandlerTHR(handles->context, [](cmsContext, cmsUInt32Number, const char*) {});
-  const Profile from(profileOf(handles->context, space));
-  const Profile to(rgbProfile(handles->context, rec709, 1));
-  if (from.get() == nullptr || to.get() == nullptr) return nullptr;
-
-  const cmsColorSpaceSignature kind = cmsGetColorSpace(from.get());
-  int taken = 0;
-  cmsUInt32Number format = 0;
-  if (kind == cmsSigGrayData && channels == 1) {
-    taken = 1;
-    format = TYPE_GRAY_FLT;
-  } else if (kind == cmsSigRgbData && channels != 4) {
-    taken = 3;
-    format = TYPE_RGB_FLT;
-  } else if (kind == cmsSigCmykData && channels == 4) {
-    taken = 4;
-    format = TYPE_CMYK_FLT;
-  } else {
-    return nullptr;
+/// LittleCMS with a context of its own.
+class ColourTransform::Engine {
+ public:
+  /// A broken profile leaves no transform.
+  Engine(const ColourSpace& space, std::size_t channels)
+      : context_(cmsCreateContext(nullptr, nullptr)) {
+    if (context_ == nullptr) return;
+    cmsSetLogErrorHandlerTHR(context_, [](cmsContext, cmsUInt32Number, const char*) {});
+    const Profile from(profileOf(context_, space));
+    const Profile to(rgbProfile(context_, rec709, 1));
+    if (from.get() == nullptr || to.get() == nullptr) return;
+    const cmsColorSpaceSignature kind = cmsGetColorSpace(from.get());
+    cmsUInt32Number format = 0;
+    if (kind == cmsSigGrayData && channels == 1) {
+      channels_ = 1;
+      format = TYPE_GRAY_FLT;
+    } else if (kind == cmsSigRgbData && channels != 4) {
+      channels_ = 3;
+      format = TYPE_RGB_FLT;
+    } else if (kind == cmsSigCmykData && channels == 4) {
+      channels_ = 4;
+      format = TYPE_CMYK_FLT;
+    } else {
+      return;
+    }
+    transform_ =
+        cmsCreateTransformTHR(context_, from.get(), format, to.get(), TYPE_RGB_FLT,
+                              INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOCACHE | cmsFLAGS_NOOPTIMIZE);
   }
-  handles->transform =
-      cmsCreateTransformTHR(handles->context, from.get(), format, to.get(), TYPE_RGB_FLT,
-                            INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOCACHE | cmsFLAGS_NOOPTIMIZE);
-  if (handles->transform == nullptr) return nullptr;
-  return std::unique_ptr<ColourTransform>(new ColourTransform(std::move(handles), taken));
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+  ~Engine() {
+    if (transform_ != nullptr) cmsDeleteTransform(transform_);
+    if (context_ != nullptr) cmsDeleteContext(context_);
+  }
+
+  [[nodiscard]] bool isReady() const { return transform_ != nullptr; }
+  [[nodiscard]] std::size_t channels() const { return channels_; }
+
+  /// The light of one colour.
+  [[nodiscard]] Linear at(std::array<float, 4> samples) const {
+    constexpr float ink_unit = 100;
+    for (std::size_t i = 0; channels_ == 4 && i < 4; ++i) samples[i] *= ink_unit;
+    Linear linear{};
+    cmsDoTransform(transform_, samples.data(), linear.data(), 1);
+    for (float& value : linear) {
+      if (!std::isfinite(value)) value = 0;
+    }
+    return linear;
+  }
+
+ private:
+  cmsContext context_;
+  cmsHTRANSFORM transform_ = nullptr;
+  std::size_t channels_ = 0;
+};
+
+namespace {
+
+constexpr std::size_t curve_steps = 4096;
+
+struct Place {
+  std::size_t step;
+  float rest;
+};
+
+/// Where a sample lies on a scale of `steps` steps.
+Place placeOf(double sample, std::size_t steps) {
+  const double scaled = sample * static_cast<double>(steps);
+  const auto step = std::min(static_cast<std::size_t>(scaled), steps - 1);
+  return {step, static_cast<float>(scaled - static_cast<double>(step))};
 }
 
-ColourTransform::ColourTransform(std::unique_ptr<Handles> handles, int channels)
-    : handles_(std::move(handles)), channels_(channels) {}
+}  // namespace
 
-ColourTransform::~ColourTransform() = default;
+std::unique_ptr<ColourTransform> ColourTransform::make(const ColourSpace& space, int channels) {
+  if (space.icc_profile.empty() && (!space.chromaticities || channels == 4)) return nullptr;
+  const Engine engine(space, static_cast<std::size_t>(channels));
+  if (!engine.isReady()) return nullptr;
+  std::unique_ptr<ColourTransform> transform(new ColourTransform(engine.channels()));
+  if (!transform->sampleCurves(engine)) transform->sampleGrid(engine);
+  return transform;
+}
 
-void ColourTransform::run(const float* samples, float* linear, std::size_t colours) const {
-  cmsDoTransform(handles_->transform, samples, linear, static_cast<cmsUInt32Number>(colours));
+bool ColourTransform::sampleCurves(const Engine& engine) {
+  if (channels_ == 4) return false;
+  const Linear black = engine.at({});
+  for (std::size_t channel = 0; channel < channels_; ++channel) {
+    for (std::size_t i = 0; i <= curve_steps; ++i) {
+      std::array<float, 4> samples{};
+      samples[channel] = static_cast<float>(i) / curve_steps;
+      Linear linear = engine.at(samples);
+      // The sum of the curves has black once.
+      for (std::size_t c = 0; channel > 0 && c < 3; ++c) linear[c] -= black[c];
+      curves_.push_back(linear);
+    }
+  }
+  constexpr float most_error = 1e-5F;
+  for (int probe = 0; channels_ == 3 && probe < 125; ++probe) {
+    const std::array<double, 3> samples{probe % 5 / 4.0, probe / 5 % 5 / 4.0, probe / 25 / 4.0};
+    const Linear exact = engine.at({static_cast<float>(samples[0]), static_cast<float>(samples[1]),
+                                    static_cast<float>(samples[2])});
+    const Linear sum = sumOfCurves(samples.data());
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (std::abs(exact[c] - sum[c]) > most_error) return false;
+    }
+  }
+  return true;
+}
+
+void ColourTransform::sampleGrid(const Engine& engine) {
+  curves_.clear();
+  edge_ = channels_ == 4 ? 23 : 65;
+  std::size_t count = 1;
+  for (std::size_t i = 0; i < channels_; ++i) count *= edge_;
+  grid_.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    std::array<float, 4> samples{};
+    std::size_t rest = i;
+    for (std::size_t channel = 0; channel < channels_; ++channel, rest /= edge_)
+      samples[channel] = static_cast<float>(rest % edge_) / static_cast<float>(edge_ - 1);
+    grid_.push_back(engine.at(samples));
+  }
+}
+
+ColourTransform::Linear ColourTransform::sumOfCurves(const double* samples) const {
+  Linear sum{};
+  for (std::size_t channel = 0; channel < channels_; ++channel) {
+    const Place place = placeOf(samples[channel], curve_steps);
+    const Linear* at = &curves_[channel * (curve_steps + 1) + place.step];
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += at[0][c] + (at[1][c] - at[0][c]) * place.rest;
+  }
+  return sum;
+}
+
+ColourTransform::Linear ColourTransform::interpolated(const double* samples) const {
+  std::array<Place, 4> places{};
+  for (std::size_t i = 0; i < channels_; ++i) places[i] = placeOf(samples[i], edge_ - 1);
+  Linear sum{};
+  for (std::size_t corner = 0; corner < std::size_t{1} << channels_; ++corner) {
+    float weight = 1;
+    std::size_t at = 0;
+    std::size_t stride = 1;
+    for (std::size_t i = 0; i < channels_; ++i, stride *= edge_) {
+      const std::size_t upper = corner >> i & 1;
+      weight *= upper == 1 ? places[i].rest : 1 - places[i].rest;
+      at += (places[i].step + upper) * stride;
+    }
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * grid_[at][c];
+  }
+  return sum;
 }
 
 }  // namespace vdbdither

@@ -41,13 +41,19 @@ double straightValueOf(Sample sample, double opacity) {
 }
 
 /// Linear light by sample, for this many samples.
-std::vector<double> curveOf(const ColourSpace& space, std::size_t count) {
+std::vector<double> curveOf(const std::optional<double>& exponent, std::size_t count) {
   std::vector<double> curve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double encoded = static_cast<double>(i) / static_cast<double>(count - 1);
-    curve[i] = space.exponent ? std::pow(encoded, *space.exponent) : linearOfSrgb(encoded);
+    curve[i] = exponent ? std::pow(encoded, *exponent) : linearOfSrgb(encoded);
   }
   return curve;
+}
+
+/// The same; that of sRGB is made once.
+std::vector<double> fineCurveOf(const std::optional<double>& exponent) {
+  static const std::vector<double> srgb = curveOf(std::nullopt, 65536);
+  return exponent ? curveOf(exponent, 65536) : srgb;
 }
 
 }  // namespace
@@ -60,29 +66,26 @@ TextureBuilder::TextureBuilder(std::uint32_t width, std::uint32_t height,
       transform_(ColourTransform::make(space, layout.colours)),
       texture_{width, height, {}} {
   texture_.texels.reserve(std::size_t{width} * height);
-  const bool is_divided =
-      layout.opacity == SampleLayout::Opacity::associated || layout.colours == 4;
-  if (transform_ != nullptr) {
-    encoded_.resize(std::size_t{width} * static_cast<std::size_t>(transform_->channels()));
-    transformed_.resize(std::size_t{width} * 3);
-  } else if (layout.type == SampleLayout::Type::real) {
-    return;
-  } else if (is_divided || layout.type == SampleLayout::Type::word) {
-    curve_ = curveOf(space, 65536);
-  } else {
-    curve_ = curveOf(space, 256);
-  }
+  if (transform_ != nullptr || layout.type == SampleLayout::Type::real) return;
+  const bool has_other_values = layout.type == SampleLayout::Type::word || layout.colours == 4 ||
+                                layout.opacity == SampleLayout::Opacity::associated;
+  curve_ = has_other_values ? fineCurveOf(space.exponent) : curveOf(space.exponent, 256);
+  for (std::size_t i = 0; !has_other_values && i < 256; ++i)
+    opaque_curve_.push_back(shareOf(curve_[i]));
 }
 
 void TextureBuilder::row(const std::uint8_t* samples) {
   throwIfInterrupted();
+  const std::size_t begin = texture_.texels.size();
+  texture_.texels.resize(begin + texture_.width);
+  Texture::Texel* texels = texture_.texels.data() + begin;
   switch (layout_.type) {
     case SampleLayout::Type::byte:
-      return convert(samples);
+      return convert(samples, texels);
     case SampleLayout::Type::word:
-      return convert(reinterpret_cast<const std::uint16_t*>(samples));
+      return convert(reinterpret_cast<const std::uint16_t*>(samples), texels);
     case SampleLayout::Type::real:
-      return convert(reinterpret_cast<const float*>(samples));
+      return convert(reinterpret_cast<const float*>(samples), texels);
   }
 }
 
@@ -92,66 +95,47 @@ double TextureBuilder::curveAt(double encoded) const {
 }
 
 template <class Sample>
-void TextureBuilder::decodeByCurve(const Sample* pixel, double opacity, double* linear) const {
-  if (layout_.colours == 4) {
-    const double light = 1 - clipped(valueOf(pixel[3]));
-    for (int i = 0; i < 3; ++i) linear[i] = curveAt((1 - clipped(valueOf(pixel[i]))) * light);
-    return;
-  }
+TextureBuilder::Light TextureBuilder::lightOf(const Sample* pixel, double opacity) const {
+  std::array<double, 4> values{};
   for (int i = 0; i < layout_.colours; ++i) {
-    if constexpr (std::is_integral_v<Sample>) {
-      if (curve_.size() == std::size_t{std::numeric_limits<Sample>::max()} + 1 &&
-          layout_.opacity != SampleLayout::Opacity::associated) {
-        linear[i] = curve_[pixel[i]];
+    values[static_cast<std::size_t>(i)] = layout_.opacity == SampleLayout::Opacity::associated
+                                              ? straightValueOf(pixel[i], opacity)
+                                              : clipped(valueOf(pixel[i]));
+  }
+  if (layout_.colours == 1) values[1] = values[2] = values[0];
+  if (transform_ != nullptr) {
+    const ColourTransform::Linear linear = transform_->at(values.data());
+    return {clipped(linear[0]), clipped(linear[1]), clipped(linear[2])};
+  }
+  if (layout_.colours == 1) {
+    const double light = curveAt(values[0]);
+    return {light, light, light};
+  }
+  if (layout_.colours == 4) {
+    for (std::size_t i = 0; i < 3; ++i) values[i] = (1 - values[i]) * (1 - values[3]);
+  }
+  return {curveAt(values[0]), curveAt(values[1]), curveAt(values[2])};
+}
+
+template <class Sample>
+void TextureBuilder::convert(const Sample* samples, Texture::Texel* texels) const {
+  const std::size_t stride = layout_.samples();
+  const bool has_opacity = layout_.opacity != SampleLayout::Opacity::none;
+  const std::size_t green = layout_.colours == 1 ? 0 : 1;
+  for (std::size_t x = 0; x < texture_.width; ++x) {
+    const Sample* pixel = samples + x * stride;
+    const double own_opacity = has_opacity ? clipped(valueOf(pixel[layout_.colours])) : 1;
+    const double opacity = opacity_ == TextureOpacity::ignore ? 1 : own_opacity;
+    if constexpr (std::is_same_v<Sample, std::uint8_t>) {
+      if (opacity == 1 && !opaque_curve_.empty()) {
+        texels[x] = {opaque_curve_[pixel[0]], opaque_curve_[pixel[green]],
+                     opaque_curve_[pixel[2 * green]], 65535};
         continue;
       }
     }
-    linear[i] = curveAt(layout_.opacity == SampleLayout::Opacity::associated
-                            ? straightValueOf(pixel[i], opacity)
-                            : clipped(valueOf(pixel[i])));
-  }
-  if (layout_.colours == 1) linear[1] = linear[2] = linear[0];
-}
-
-template <class Sample>
-void TextureBuilder::encodeForTransform(const Sample* pixel, double opacity, float* encoded) const {
-  for (int i = 0; i < transform_->channels(); ++i) {
-    const Sample sample = pixel[layout_.colours == 1 ? 0 : i];
-    const double value = layout_.opacity == SampleLayout::Opacity::associated
-                             ? straightValueOf(sample, opacity)
-                             : clipped(valueOf(sample));
-    encoded[i] = static_cast<float>(layout_.colours == 4 ? 100 * value : value);
-  }
-}
-
-template <class Sample>
-void TextureBuilder::convert(const Sample* samples) {
-  const std::size_t stride = layout_.samples();
-  const auto opacityOf = [&](const Sample* pixel) {
-    return layout_.opacity == SampleLayout::Opacity::none
-               ? 1.0
-               : clipped(valueOf(pixel[layout_.colours]));
-  };
-  if (transform_ != nullptr) {
-    const auto channels = static_cast<std::size_t>(transform_->channels());
-    for (std::size_t x = 0; x < texture_.width; ++x) {
-      const Sample* pixel = samples + x * stride;
-      encodeForTransform(pixel, opacityOf(pixel), &encoded_[x * channels]);
-    }
-    transform_->run(encoded_.data(), transformed_.data(), texture_.width);
-  }
-  for (std::size_t x = 0; x < texture_.width; ++x) {
-    const Sample* pixel = samples + x * stride;
-    const double own_opacity = opacityOf(pixel);
-    std::array<double, 3> linear{};
-    if (transform_ != nullptr) {
-      for (std::size_t i = 0; i < 3; ++i) linear[i] = clipped(transformed_[3 * x + i]);
-    } else {
-      decodeByCurve(pixel, own_opacity, linear.data());
-    }
-    const double opacity = opacity_ == TextureOpacity::ignore ? 1 : own_opacity;
-    texture_.texels.push_back({shareOf(linear[0] * opacity), shareOf(linear[1] * opacity),
-                               shareOf(linear[2] * opacity), shareOf(opacity)});
+    const Light light = lightOf(pixel, own_opacity);
+    texels[x] = {shareOf(light[0] * opacity), shareOf(light[1] * opacity),
+                 shareOf(light[2] * opacity), shareOf(opacity)};
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -43,22 +44,19 @@ class TextureBuilder {
   [[nodiscard]] Texture take() { return std::move(texture_); }
 
  private:
+  using Light = std::array<double, 3>;
+
   template <class Sample>
-  void convert(const Sample* samples);
+  void convert(const Sample* samples, Texture::Texel* texels) const;
   template <class Sample>
-  void decodeByCurve(const Sample* pixel, double opacity, double* linear) const;
-  template <class Sample>
-  void encodeForTransform(const Sample* pixel, double opacity, float* encoded) const;
+  [[nodiscard]] Light lightOf(const Sample* pixel, double opacity) const;
   [[nodiscard]] double curveAt(double encoded) const;
 
   SampleLayout layout_;
   TextureOpacity opacity_;
-  bool is_srgb_ = true;  ///< the curve is that of sRGB
   std::unique_ptr<ColourTransform> transform_;
-  std::vector<double> curve_;       ///< linear light by sample; empty for reals
-  std::vector<double> fine_curve_;  ///< the same by 65536 steps, where samples need division
-  std::vector<float> encoded_;
-  std::vector<float> transformed_;
+  std::vector<double> curve_;                ///< linear light by sample; empty for reals
+  std::vector<std::uint16_t> opaque_curve_;  ///< the same of bytes, as opaque texels hold it
   Texture texture_;
 };
 

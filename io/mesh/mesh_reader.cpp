@@ -26,9 +26,6 @@ constexpr std::array foreign_formats{
     ForeignFormat{"#VRML", "VRML"},
     ForeignFormat{"# vtk", "VTK"},
     ForeignFormat{"Kaydara FBX", "FBX"},
-    ForeignFormat{"glTF", "binary glTF (.glb)"},
-    ForeignFormat{"{", "glTF (.gltf, or other JSON)"},
-    ForeignFormat{"DRACO", "Draco (.drc)"},
     ForeignFormat{"ISO-10303-21", "STEP"},
 };
 

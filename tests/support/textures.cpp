@@ -105,6 +105,60 @@ Bytes greyProfile(double gamma) {
   return bytes;
 }
 
+namespace {
+
+struct TableSampler {
+  cmsHTRANSFORM to_lab;
+  int channels;
+};
+
+cmsInt32Number sampleTable(const cmsUInt16Number* in, cmsUInt16Number* out, void* cargo) {
+  const auto& sampler = *static_cast<TableSampler*>(cargo);
+  const auto share = [&](int i) { return in[i] / 65535.0; };
+  std::array<double, 3> light{share(1), share(2), share(0)};
+  for (int i = 0; sampler.channels == 4 && i < 3; ++i)
+    light[static_cast<std::size_t>(i)] = (1 - share(i)) * (1 - share(3));
+  cmsCIELab lab;
+  cmsDoTransform(sampler.to_lab, light.data(), &lab, 1);
+  cmsFloat2LabEncoded(out, &lab);
+  return 1;
+}
+
+}  // namespace
+
+Bytes tableProfile(int channels) {
+  cmsToneCurve* curve = cmsBuildGamma(nullptr, 1);
+  const std::array<cmsToneCurve*, 3> curves{curve, curve, curve};
+  const cmsCIExyYTRIPLE primaries{{0.64, 0.33, 1}, {0.30, 0.60, 1}, {0.15, 0.06, 1}};
+  cmsHPROFILE rgb = cmsCreateRGBProfile(&d65, &primaries, curves.data());
+  cmsHPROFILE lab = cmsCreateLab4Profile(nullptr);
+  TableSampler sampler{cmsCreateTransform(rgb, TYPE_RGB_DBL, lab, TYPE_Lab_DBL,
+                                          INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOOPTIMIZE),
+                       channels};
+  const auto inputs = static_cast<cmsUInt32Number>(channels);
+  cmsPipeline* pipeline = cmsPipelineAlloc(nullptr, inputs, 3);
+  cmsStage* table = cmsStageAllocCLut16bit(nullptr, channels == 4 ? 13 : 33, inputs, 3, nullptr);
+  cmsStageSampleCLut16bit(table, sampleTable, &sampler, 0);
+  cmsPipelineInsertStage(pipeline, cmsAT_BEGIN, cmsStageAllocToneCurves(nullptr, inputs, nullptr));
+  cmsPipelineInsertStage(pipeline, cmsAT_END, table);
+  cmsPipelineInsertStage(pipeline, cmsAT_END, cmsStageAllocToneCurves(nullptr, 3, nullptr));
+
+  cmsHPROFILE profile = cmsCreateProfilePlaceholder(nullptr);
+  cmsSetProfileVersion(profile, 4.3);
+  cmsSetDeviceClass(profile, cmsSigOutputClass);
+  cmsSetColorSpace(profile, channels == 4 ? cmsSigCmykData : cmsSigRgbData);
+  cmsSetPCS(profile, cmsSigLabData);
+  cmsWriteTag(profile, cmsSigMediaWhitePointTag, cmsD50_XYZ());
+  cmsWriteTag(profile, cmsSigAToB0Tag, pipeline);
+  cmsWriteTag(profile, cmsSigAToB1Tag, pipeline);
+  cmsPipelineFree(pipeline);
+  cmsDeleteTransform(sampler.to_lab);
+  cmsCloseProfile(rgb);
+  cmsCloseProfile(lab);
+  cmsFreeToneCurve(curve);
+  return bytesOf(profile);
+}
+
 double srgbToLinear(double encoded) {
   return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
 }

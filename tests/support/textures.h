@@ -44,6 +44,9 @@ Bytes pngOf(const Samples& samples, bool is_interlaced = false, const PngColours
 /// grey.
 Bytes swappedProfile(double gamma);
 Bytes greyProfile(double gamma);
+/// A profile of a table. RGB: of linear light in the order blue, red, green. CMYK: each ink takes
+/// its share of the light, black of all three.
+Bytes tableProfile(int channels);
 
 /// The formula of IEC 61966-2-1.
 double srgbToLinear(double encoded);

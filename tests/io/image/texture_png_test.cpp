@@ -120,13 +120,14 @@ TEST(TexturePng, HonoursProfiles) {
       2e-4);
 }
 
-TEST(TexturePng, ABrokenProfileCountsAsNone) {
+TEST(TexturePng, HonoursProfilesOfTables) {
   const Samples samples = pattern(9, 5, 3);
-  Bytes profile = test::swappedProfile(1.8);
-  for (std::size_t i = 132; i < profile.size(); ++i) profile[i] = 0xFF;
-  Bytes bytes;
-  ASSERT_NO_THROW(bytes = pngOf(samples));
-  expectTexels(decoded(bytes), 9, 5, [&](auto x, auto y) { return srgbColour(samples, x, y); });
+  expectTexels(
+      decoded(pngOf(samples, false, {.icc_profile = test::tableProfile(3)})), 9, 5,
+      [&](auto x, auto y) {
+        return Colour{samples.share(x, y, 1), samples.share(x, y, 2), samples.share(x, y, 0), 1};
+      },
+      0.015);
 }
 
 void append(Bytes& bytes, std::uint32_t value) {
@@ -188,6 +189,25 @@ TEST(TexturePng, ReadsTheTransparentColour) {
     const double light = srgbToLinear((77 + x) / 255.0);
     return Colour{light, light, light, x == 0 ? 0.0 : 1.0};
   });
+}
+
+TEST(TexturePng, ABrokenProfileCountsAsNone) {
+  const Bytes rows{0, 10, 200, 90};
+  const Texture plain = decoded(pngOfChunks(1, 1, 8, 2, {{"IDAT", deflated(rows)}}));
+  const auto withProfile = [&](const Bytes& profile) {
+    Bytes chunk{'m', 0, 0};
+    const Bytes packed = deflated(profile);
+    chunk.insert(chunk.end(), packed.begin(), packed.end());
+    return decoded(pngOfChunks(1, 1, 8, 2, {{"iCCP", chunk}, {"IDAT", deflated(rows)}}));
+  };
+  const Bytes good = test::swappedProfile(1.8);
+  EXPECT_NE(withProfile(good).texels, plain.texels);
+  Bytes spoilt = good;
+  // Its head and its table stay, and where the tags lie is filled with nonsense.
+  for (std::size_t i = 132 + 12 * spoilt[131]; i < spoilt.size(); ++i) spoilt[i] = 0xFF;
+  EXPECT_EQ(withProfile(spoilt).texels, plain.texels);
+  EXPECT_EQ(withProfile(Bytes(200, 0x77)).texels, plain.texels);
+  EXPECT_EQ(withProfile({good.begin(), good.begin() + 100}).texels, plain.texels);
 }
 
 TEST(TexturePng, RefusesWhatIsDamaged) {
