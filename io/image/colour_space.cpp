@@ -89,7 +89,8 @@ class ColourTransform::Engine {
     const Profile from(profileOf(context_, space));
     const Profile to(rgbProfile(context_, rec709, 1));
     if (from.get() == nullptr || to.get() == nullptr) return;
-    const cmsColorSpaceSignature kind = cmsGetColorSpace(from.get());
+    // A number, since a profile may hold one that is none of the enumeration's.
+    const auto kind = static_cast<cmsUInt32Number>(cmsGetColorSpace(from.get()));
     cmsUInt32Number format = 0;
     if (kind == cmsSigGrayData && channels == 1) {
       channels_ = 1;
@@ -177,7 +178,8 @@ bool ColourTransform::sampleCurves(const Engine& engine) {
   }
   constexpr float most_error = 1e-5F;
   for (int probe = 0; channels_ == 3 && probe < 125; ++probe) {
-    const std::array<double, 3> samples{probe % 5 / 4.0, probe / 5 % 5 / 4.0, probe / 25 / 4.0};
+    const std::array<int, 3> steps{probe % 5, probe / 5 % 5, probe / 25};
+    const std::array<double, 3> samples{steps[0] / 4.0, steps[1] / 4.0, steps[2] / 4.0};
     const Linear exact = engine.at({static_cast<float>(samples[0]), static_cast<float>(samples[1]),
                                     static_cast<float>(samples[2])});
     const Linear sum = sumOfCurves(samples.data());

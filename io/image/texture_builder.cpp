@@ -21,7 +21,11 @@ double clipped(double value) {
   return value < 1 ? value : 1;
 }
 
-std::uint16_t shareOf(double value) { return static_cast<std::uint16_t>(value * most_share + 0.5); }
+/// To the nearest; of two, up.
+std::uint16_t shareOf(double value) {
+  const double shifted = value * most_share + 0.5;
+  return static_cast<std::uint16_t>(shifted);
+}
 
 /// A sample as a share of its maximum; reals as they are.
 template <class Sample>
@@ -41,13 +45,19 @@ double straightValueOf(Sample sample, double opacity) {
 }
 
 /// Linear light by sample, for this many samples.
-std::vector<double> curveOf(const ColourSpace& space, std::size_t count) {
+std::vector<double> curveOf(const std::optional<double>& exponent, std::size_t count) {
   std::vector<double> curve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double encoded = static_cast<double>(i) / static_cast<double>(count - 1);
-    curve[i] = space.exponent ? std::pow(encoded, *space.exponent) : linearOfSrgb(encoded);
+    curve[i] = exponent ? std::pow(encoded, *exponent) : linearOfSrgb(encoded);
   }
   return curve;
+}
+
+/// The same; that of sRGB is made once.
+std::vector<double> fineCurveOf(const std::optional<double>& exponent) {
+  static const std::vector<double> srgb = curveOf(std::nullopt, 65536);
+  return exponent ? curveOf(exponent, 65536) : srgb;
 }
 
 }  // namespace
@@ -63,7 +73,7 @@ TextureBuilder::TextureBuilder(std::uint32_t width, std::uint32_t height,
   if (transform_ != nullptr || layout.type == SampleLayout::Type::real) return;
   const bool has_other_values = layout.type == SampleLayout::Type::word || layout.colours == 4 ||
                                 layout.opacity == SampleLayout::Opacity::associated;
-  curve_ = curveOf(space, has_other_values ? 65536 : 256);
+  curve_ = has_other_values ? fineCurveOf(space.exponent) : curveOf(space.exponent, 256);
   for (std::size_t i = 0; !has_other_values && i < 256; ++i)
     opaque_curve_.push_back(shareOf(curve_[i]));
 }
@@ -85,7 +95,8 @@ void TextureBuilder::row(const std::uint8_t* samples) {
 
 double TextureBuilder::curveAt(double encoded) const {
   if (curve_.empty()) return encoded;
-  return curve_[static_cast<std::size_t>(encoded * static_cast<double>(curve_.size() - 1) + 0.5)];
+  const double shifted = encoded * static_cast<double>(curve_.size() - 1) + 0.5;
+  return curve_[static_cast<std::size_t>(shifted)];
 }
 
 template <class Sample>
@@ -133,18 +144,23 @@ void TextureBuilder::convert(const Sample* samples, Texture::Texel* texels) cons
   }
 }
 
-void checkTextureSize(std::uint64_t width, std::uint64_t height, std::size_t file_bytes) {
+void checkTextureSize(std::uint64_t width, std::uint64_t height, std::uint64_t pixel_bytes,
+                      std::size_t file_bytes) {
   if (width == 0 || height == 0) throw DataError("has no pixels; save it again");
   const std::string size = std::to_string(width) + " x " + std::to_string(height) + " pixels";
   if (width > most_texels / height) {
     throw DataError("has " + size + "; at most " + std::to_string(most_texels) +
                     " are read; scale it down");
   }
-  // Up to here it takes some hundred MB at most, whatever the file holds.
+  // Up to here it takes some hundred MB at most, and little time, whatever the file holds.
   constexpr std::uint64_t cheap_texels = std::uint64_t{1} << 24;
+  constexpr std::uint64_t cheap_bytes = std::uint64_t{1} << 28;
   constexpr std::uint64_t most_texels_per_byte = 64;
+  constexpr std::uint64_t most_bytes_per_byte = 256;
   const std::uint64_t texels = width * height;
-  if (texels > cheap_texels && texels / most_texels_per_byte > file_bytes) {
+  const std::uint64_t bytes = texels * pixel_bytes;
+  if ((texels > cheap_texels && texels / most_texels_per_byte > file_bytes) ||
+      (bytes > cheap_bytes && bytes / most_bytes_per_byte > file_bytes)) {
     throw DataError("has " + size + " in " + std::to_string(file_bytes) +
                     " bytes, too few for a picture; scale it down");
   }

@@ -63,7 +63,9 @@ class TextureBuilder {
 /// Throws DataError, in words that go on from the image's name, for a size without pixels, above
 /// `most_texels`, or far beyond what so many bytes hold of a picture: an image of one colour can be
 /// packed to nearly nothing.
-void checkTextureSize(std::uint64_t width, std::uint64_t height, std::size_t file_bytes);
+/// @param pixel_bytes  of a pixel in the file before it was packed
+void checkTextureSize(std::uint64_t width, std::uint64_t height, std::uint64_t pixel_bytes,
+                      std::size_t file_bytes);
 
 /// The decoders of decodeTexture. They throw DataError in words that go on from the image's name.
 Texture decodePngTexture(std::span<const std::uint8_t> bytes, TextureOpacity opacity);

@@ -90,10 +90,10 @@ ExrSize checkedExrSize(const Imf::Header& header, std::size_t file_bytes) {
   const std::uint64_t width = extent(window.min.x, window.max.x);
   const std::uint64_t height = extent(window.min.y, window.max.y);
   if (window.isEmpty()) throw DataError("has no pixels; save it again");
-  checkTextureSize(width, height, file_bytes);
   std::uint64_t pixel_bytes = 0;
   for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel)
     pixel_bytes += channel.channel().type == Imf::HALF ? 2 : 4;
+  checkTextureSize(width, height, pixel_bytes, file_bytes);
 
   std::uint64_t chunk_width = width;
   std::uint64_t chunk_height = rowsOfChunk(header.compression());

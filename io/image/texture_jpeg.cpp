@@ -117,7 +117,7 @@ Texture decodeJpegTexture(Bytes bytes, TextureOpacity opacity) {
                                          &subsampling, &colour_space);
   if ((header != 0 && !isHarmless(decoder.get())) || width < 1 || height < 1)
     throw DataError("is no readable JPEG: it is damaged or of a rare kind; save it again");
-  checkTextureSize(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height),
+  checkTextureSize(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), 4,
                    bytes.size());
   const JpegMarkers markers = markersOf(bytes);
   // Each takes time for all of the image, though it may be a few bytes long.

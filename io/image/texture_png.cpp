@@ -66,7 +66,7 @@ Texture decodePngTexture(std::span<const std::uint8_t> bytes, TextureOpacity opa
   png_read_info(png, info);
   const std::uint32_t width = png_get_image_width(png, info);
   const std::uint32_t height = png_get_image_height(png, info);
-  checkTextureSize(width, height, bytes.size());
+  checkTextureSize(width, height, (png_get_rowbytes(png, info) + width - 1) / width, bytes.size());
   if (png_get_rowbytes(png, info) * std::uint64_t{height} / deflate_ratio > bytes.size())
     throw DataError("is no readable PNG: it is cut short");
 

@@ -183,7 +183,7 @@ class TiffRows {
     }
   }
 
-  static constexpr std::uint64_t most_band_bytes = std::uint64_t{1} << 28;
+  static constexpr std::uint64_t most_band_bytes = std::uint64_t{1} << 27;
 
   TIFF* tiff_;
   const TiffHead& head_;
@@ -307,7 +307,8 @@ Texture decodeTiffTexture(Bytes bytes, TextureOpacity opacity) {
   const TiffHandle tiff = openTiff(memory, "r");
   if (tiff == nullptr) throw DataError(damaged_tiff);
   const TiffHead head = headOf(tiff.get());
-  checkTextureSize(head.width, head.height, bytes.size());
+  checkTextureSize(head.width, head.height, (head.samples * std::uint64_t{head.bits} + 7) / 8,
+                   bytes.size());
   constexpr int most_samples = 16;
   if (head.samples == 0 || head.samples > most_samples)
     throw DataError("is a TIFF of too many samples a pixel; save it as RGB");

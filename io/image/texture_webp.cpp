@@ -35,7 +35,7 @@ Texture decodeWebpTexture(std::span<const std::uint8_t> bytes, TextureOpacity op
   if (features.has_animation != 0) throw DataError("is an animation; save a single image");
   const auto width = static_cast<std::uint32_t>(features.width);
   const auto height = static_cast<std::uint32_t>(features.height);
-  checkTextureSize(width, height, bytes.size());
+  checkTextureSize(width, height, 4, bytes.size());
 
   SampleLayout layout;
   if (features.has_alpha != 0) layout.opacity = SampleLayout::Opacity::straight;

@@ -26,7 +26,6 @@ constexpr std::array foreign_formats{
     ForeignFormat{"#VRML", "VRML"},
     ForeignFormat{"# vtk", "VTK"},
     ForeignFormat{"Kaydara FBX", "FBX"},
-    ForeignFormat{"PK\x03\x04", "3MF (or another zip archive)"},
     ForeignFormat{"ISO-10303-21", "STEP"},
 };
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "io/mesh/mesh_format.h"
+#include "io/mesh/ply_colours.h"
 #include "io/mesh/ply_header.h"
 #include "io/mesh/polygon.h"
 #include "io/mesh/text_cursor.h"
@@ -210,7 +211,11 @@ class Body {
 class BodyParser {
  public:
   BodyParser(const MeshFile& file, const PlyHeader& header)
-      : file_(file), body_(file, header), polygons_(file, mesh_) {}
+      : file_(file), body_(file, header), polygons_(file, mesh_) {
+    if (!file.wantsColours()) return;
+    colours_.emplace(file, header);
+    polygons_.keepPlaces();
+  }
 
   Mesh parse(const PlyHeader& header) {
     const auto vertices =
@@ -238,6 +243,7 @@ class BodyParser {
     body_.warnOfLongerLines();
     judgeUnread(file_, mesh_, body_.rest(), "the last element");
     polygons_.finish();
+    if (colours_) mesh_.appearance = colours_->finish(mesh_);
     return std::move(mesh_);
   }
 
@@ -258,6 +264,7 @@ class BodyParser {
     }
     if (element.count >= restart) file_.refuse("more than 4294967294 vertices; split the part");
     mesh_.vertices.reserve(body_.atMost(element));
+    if (colours_) colours_->begin(element);
     for (std::uint64_t i = 0; i < element.count; ++i) {
       body_.enter(element, i);
       Vec3d position(0.0);
@@ -265,7 +272,7 @@ class BodyParser {
         const auto axis = std::find(axes.begin(), axes.end(), p);
         const PlyProperty& property = element.properties[static_cast<std::size_t>(p)];
         if (axis == axes.end()) {
-          body_.skip(property);
+          takeOrSkip(p, property);
         } else {
           position[static_cast<int>(axis - axes.begin())] = body_.next(property.type);
         }
@@ -274,6 +281,7 @@ class BodyParser {
         body_.refuse("the vertex is not finite (" + shown(position) + "); repair the mesh");
       }
       mesh_.vertices.push_back(position);
+      if (colours_) colours_->endVertex();
       body_.leave();
     }
   }
@@ -285,6 +293,7 @@ class BodyParser {
     if (list < 0 || !element.properties[static_cast<std::size_t>(list)].count_type) {
       file_.refuse("element '" + element.name + "' has no list 'vertex_indices'; export it again");
     }
+    if (colours_) colours_->begin(element);
     for (std::uint64_t i = 0; i < element.count; ++i) {
       body_.enter(element, i);
       const char* position = body_.position();
@@ -293,16 +302,27 @@ class BodyParser {
         if (p == list) {
           parseCorners(property, are_strips);
         } else {
-          body_.skip(property);
+          takeOrSkip(p, property);
         }
       }
+      const std::size_t before = mesh_.triangles.size();
       if (are_strips) {
         addStrips();
       } else {
         polygons_.add(corners_, position);
       }
+      if (colours_)
+        colours_->endFace(polygons_.places(), corners_.size(), mesh_.triangles.size() - before);
       body_.leave();
     }
+  }
+
+  /// A property of number `p` that is not of the shape.
+  void takeOrSkip(int p, const PlyProperty& property) {
+    const auto number = static_cast<std::size_t>(p);
+    if (!colours_ || !colours_->takes(number)) return body_.skip(property);
+    std::uint64_t count = property.count_type ? body_.nextCount(property) : 1;
+    for (; count > 0; --count) colours_->take(number, body_.next(property.type));
   }
 
   void parseCorners(const PlyProperty& list, bool with_restarts) {
@@ -345,6 +365,7 @@ class BodyParser {
   Body body_;
   Mesh mesh_;
   PolygonCollector polygons_;
+  std::optional<PlyColours> colours_;  ///< where they are wanted
   std::vector<std::uint32_t> corners_;
 };
 

@@ -64,7 +64,9 @@ class HeaderParser {
         parseProperty();
       } else if (keyword == "end_header") {
         break;
-      } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
+      } else if (keyword == "comment") {
+        parseComment();
+      } else if (!keyword.empty() && keyword != "obj_info") {
         refuse(inQuotes(keyword) + " is not a keyword of a PLY header; export it again");
       }
     }
@@ -97,6 +99,14 @@ class HeaderParser {
     refuse(
         "the format is not 'ascii 1.0', 'binary_little_endian 1.0' or 'binary_big_endian 1.0'; "
         "export it again");
+  }
+
+  void parseComment() {
+    if (text_.word() != "TextureFile") return;
+    text_.skipBlanks();
+    std::string_view name = text_.line();
+    while (name.ends_with(' ') || name.ends_with('\t')) name.remove_suffix(1);
+    if (!name.empty()) header_.texture_files.emplace_back(name);
   }
 
   void parseElement() {

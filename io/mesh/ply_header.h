@@ -56,7 +56,8 @@ struct PlyElement {
 struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::kAscii;
   std::vector<PlyElement> elements;
-  std::size_t body = 0;  ///< where it begins in the file
+  std::vector<std::string> texture_files{};  ///< "comment TextureFile", by number
+  std::size_t body = 0;                      ///< where it begins in the file
 };
 
 /// Parses the header of a PLY file. Refuses what is wrong with it, and counts that are more than

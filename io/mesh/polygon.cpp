@@ -117,29 +117,29 @@ bool isFan(const std::vector<Vec2d>& points) {
 }  // namespace
 
 void triangulate(const std::vector<Vec3d>& vertices, std::span<const std::uint32_t> polygon,
-                 std::vector<Mesh::Triangle>& triangles) {
-  if (polygon.size() == 3) {
-    triangles.push_back({polygon[0], polygon[1], polygon[2]});
-    return;
-  }
+                 std::vector<Mesh::Triangle>& triangles, std::vector<Mesh::Triangle>* places) {
+  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    triangles.push_back({polygon[a], polygon[b], polygon[c]});
+    if (places != nullptr) places->push_back({a, b, c});
+  };
+  if (polygon.size() == 3) return add(0, 1, 2);
   const std::vector<Vec2d> points = flattened(vertices, polygon);
   if (isFan(points)) {
-    for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
-      triangles.push_back({polygon[0], polygon[i], polygon[i + 1]});
-    }
+    for (std::uint32_t i = 1; i + 1 < polygon.size(); ++i) add(0, i, i + 1);
     return;
   }
   Ring ring(points);
   std::uint32_t at = 0;
   for (std::size_t left = polygon.size(); left > 2; --left) {
     const std::uint32_t ear = ring.earFrom(at, left);
-    triangles.push_back({polygon[ring.before(ear)], polygon[ear], polygon[ring.after(ear)]});
+    add(ring.before(ear), ear, ring.after(ear));
     at = ring.after(ear);
     ring.clip(ear);
   }
 }
 
 void PolygonCollector::add(std::span<const std::uint32_t> corners, const char* position) {
+  places_.clear();
   if (corners.size() < 3) {
     ++incomplete_;
   } else if (corners.size() > most_corners) {
@@ -147,7 +147,7 @@ void PolygonCollector::add(std::span<const std::uint32_t> corners, const char* p
                                      " corners, at most " + std::to_string(most_corners) +
                                      " are read; export triangles");
   } else {
-    triangulate(mesh_.vertices, corners, mesh_.triangles);
+    triangulate(mesh_.vertices, corners, mesh_.triangles, keeps_places_ ? &places_ : nullptr);
   }
 }
 

@@ -18,8 +18,10 @@ namespace vdbdither {
 /// @param vertices  positions
 /// @param polygon   3 to some thousand indices into `vertices`; the time grows with the square at
 /// worst
+/// @param places    if not null, gets the same triangles as positions in `polygon`
 void triangulate(const std::vector<openvdb::Vec3d>& vertices,
-                 std::span<const std::uint32_t> polygon, std::vector<Mesh::Triangle>& triangles);
+                 std::span<const std::uint32_t> polygon, std::vector<Mesh::Triangle>& triangles,
+                 std::vector<Mesh::Triangle>* places = nullptr);
 
 /// Takes the faces of a polygon file into a mesh of triangles, and counts the ones that are none.
 class PolygonCollector {
@@ -28,6 +30,11 @@ class PolygonCollector {
 
   /// Corners are indices into the mesh's vertices, in range. `position` is where the file has them.
   void add(std::span<const std::uint32_t> corners, const char* position);
+
+  /// Keeps the places of every polygon that is added from here on.
+  void keepPlaces() { keeps_places_ = true; }
+  /// The triangles of the polygon that was added last, in their order, as positions in it.
+  [[nodiscard]] std::span<const Mesh::Triangle> places() const { return places_; }
 
   /// Warns of faces with fewer than three corners.
   void finish() const;
@@ -38,6 +45,8 @@ class PolygonCollector {
   const MeshFile& file_;
   Mesh& mesh_;
   std::size_t incomplete_ = 0;
+  bool keeps_places_ = false;
+  std::vector<Mesh::Triangle> places_;
 };
 
 }  // namespace vdbdither

@@ -41,6 +41,16 @@ std::optional<Found> find(const fs::path& folder, const std::string& name) {
   return Found{path, end == real_folder.end()};
 }
 
+std::optional<Found> findFor(const MeshFile& file, const std::string& name) {
+  fs::path folder = fs::path(file.name()).parent_path();
+  if (folder.empty()) folder = ".";
+  const std::string last = name.substr(name.rfind('/') + 1);
+  std::optional<Found> found;
+  if (!relativePathProblem(name)) found = find(folder, name);
+  if (!found && last != name) found = find(folder, last);
+  return found;
+}
+
 }  // namespace
 
 SideFile readSideFile(const MeshFile& file, std::string_view kind, std::string_view path,
@@ -49,12 +59,7 @@ SideFile readSideFile(const MeshFile& file, std::string_view kind, std::string_v
   const std::string name = normalized(path);
   const std::string last = name.substr(name.rfind('/') + 1);
   if (const auto problem = fileNameProblem(last)) file.refuse(shown + ": the name " + *problem);
-  fs::path folder = fs::path(file.name()).parent_path();
-  if (folder.empty()) folder = ".";
-
-  std::optional<Found> found;
-  if (!relativePathProblem(name)) found = find(folder, name);
-  if (!found && last != name) found = find(folder, last);
+  const std::optional<Found> found = findFor(file, name);
   if (!found) {
     file.refuse(shown + (relativePathProblem(name) && name.starts_with("..")
                              ? " lies outside of the folder of the mesh; move it there"
@@ -67,6 +72,14 @@ SideFile readSideFile(const MeshFile& file, std::string_view kind, std::string_v
   } catch (const DataError& error) {
     file.refuse(error.what());
   }
+}
+
+bool hasSideFile(const MeshFile& file, std::string_view path) {
+  const std::string name = normalized(path);
+  if (fileNameProblem(name.substr(name.rfind('/') + 1))) return false;
+  const std::optional<Found> found = findFor(file, name);
+  std::error_code error;
+  return found && found->within && fs::is_regular_file(found->path, error);
 }
 
 }  // namespace vdbdither

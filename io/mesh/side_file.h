@@ -30,4 +30,7 @@ struct SideFile {
 SideFile readSideFile(const MeshFile& file, std::string_view kind, std::string_view path,
                       std::uint64_t most_bytes);
 
+/// Whether `readSideFile` finds a file that it may read.
+bool hasSideFile(const MeshFile& file, std::string_view path);
+
 }  // namespace vdbdither

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "io/mesh/mesh_format.h"
+#include "io/mesh/stl_colours.h"
 #include "io/mesh/text_cursor.h"
 #include "io/mesh/unread_bytes.h"
 #include "io/mesh/vertex_welder.h"
@@ -158,10 +159,13 @@ class RecordLayouts {
 
 Mesh readRecords(const MeshFile& file, const RecordLayout& layout) {
   VertexWelder welder(file);
+  std::optional<StlColours> colours;
+  if (file.wantsColours() && !layout.has_attributes) colours.emplace();
   std::size_t triangles = 0;
   for (const RecordLayout::Block& block : layout.blocks) {
     welder.reserve(block.count);
     const char* facet = file.bytes().data() + block.header + header_size;
+    if (colours) colours->begin(file.bytes().substr(block.header, header_size - 4));
     for (std::size_t i = 0; i < block.count; ++i) {
       if (triangles++ % triangles_per_look == 0) throwIfInterrupted();
       std::array<Vec3d, 3> corners;
@@ -176,10 +180,13 @@ Mesh readRecords(const MeshFile& file, const RecordLayout& layout) {
         at += 12;
       }
       welder.addTriangle(corners);
+      if (colours) colours->add(static_cast<std::uint16_t>(littleEndian16(at)));
       facet += facet_size + (layout.has_attributes ? littleEndian16(at) : 0);
     }
   }
-  return welder.take();
+  Mesh mesh = welder.take();
+  if (colours) mesh.appearance = colours->finish();
+  return mesh;
 }
 
 /// Reads the layout that makes a closed mesh, or else the first into which all bytes fit.

@@ -20,38 +20,46 @@ static bool isOneLine(std::string_view message) {
   return message.find_first_of("\r\n") == std::string_view::npos;
 }
 
-static void checkLook(const Mesh& mesh) {
+static void checkShare(float value) { require(value >= 0 && value <= 1); }
+
+static void checkAppearance(const Mesh& mesh) {
   if (mesh.appearance == nullptr) return;
-  const Appearance& look = *mesh.appearance;
+  const Appearance& appearance = *mesh.appearance;
   const std::size_t triangles = mesh.triangles.size();
-  require(look.material.size() == triangles);
-  require(look.coordinates.empty() || look.coordinates.size() == triangles);
-  require(look.colours.empty() || look.colours.size() == triangles);
-  for (const std::uint32_t material : look.material) require(material < look.materials.size());
-  for (const Appearance::Coordinates& corners : look.coordinates) {
-    for (const openvdb::Vec2f& at : corners)
-      require(std::isfinite(at.x()) && std::isfinite(at.y()));
+  require(appearance.material.size() == triangles);
+  require(appearance.coordinates.empty() || appearance.coordinates.size() == triangles);
+  require(appearance.colours.empty() || appearance.colours.size() == triangles);
+  for (const std::uint32_t material : appearance.material)
+    require(material < appearance.materials.size());
+  for (const SurfaceMaterial& material : appearance.materials) {
+    for (int i = 0; i < 4; ++i) checkShare(material.colour[i]);
+    require(material.texture == SurfaceMaterial::no_texture ||
+            material.texture < appearance.textures.size());
   }
-  for (const Appearance::Colours& corners : look.colours) {
+  for (const Appearance::Colours& corners : appearance.colours) {
     for (const openvdb::Vec4f& colour : corners) {
-      for (int c = 0; c < 4; ++c) require(colour[c] >= 0 && colour[c] <= 1);
+      for (int i = 0; i < 4; ++i) checkShare(colour[i]);
     }
+  }
+  for (const Appearance::Coordinates& corners : appearance.coordinates) {
+    for (const openvdb::Vec2f& corner : corners)
+      require(std::isfinite(corner.x()) && std::isfinite(corner.y()));
   }
 }
 
 static void parseAndCheck(std::string_view bytes, MeshColours colours) {
   try {
-    // The name settles what the content leaves open: a binary STL of a wrong size. Its folder does
-    // not exist, so that no file beside it is found.
+    // The ending settles what the content leaves open: a binary STL of a wrong size. No file of
+    // another name is ever found in this folder.
     const Mesh mesh = parseMesh(MeshFile(
-        "nowhere/fuzz.stl", bytes, [](const std::string& warning) { require(isOneLine(warning)); },
-        colours));
+        "no such folder/fuzz.stl", bytes,
+        [](const std::string& warning) { require(isOneLine(warning)); }, colours));
     require(!mesh.triangles.empty());
     for (const openvdb::Vec3d& vertex : mesh.vertices) require(isFinite(vertex));
     for (const Mesh::Triangle& triangle : mesh.triangles) {
       for (const std::uint32_t vertex : triangle) require(vertex < mesh.vertices.size());
     }
-    checkLook(mesh);
+    checkAppearance(mesh);
   } catch (const DataError& error) {
     require(isOneLine(error.what()));
   }

@@ -16,8 +16,17 @@ Mesh parse(const std::string& bytes, Warnings* warnings = nullptr,
 /// Parses what must be fine: any warning fails the test.
 Mesh parseQuietly(const std::string& bytes);
 
+/// Parses the content of a mesh file called `name` with its colours, and expects a sound appearance
+/// if there is any.
+Mesh parseWithColours(const std::string& bytes, Warnings* warnings = nullptr,
+                      const std::string& name = "part");
+
 /// Returns the message of the refusal, or "read".
 std::string refusal(const std::string& bytes, const std::string& name = "part");
+std::string refusalWithColours(const std::string& bytes, const std::string& name = "part");
+
+/// Expects that every index is in range and every number finite and, where it must be, 0 … 1.
+void expectSoundAppearance(const Mesh& mesh);
 
 void expectSame(const Mesh& mesh, const Mesh& expected);
 

@@ -160,6 +160,15 @@ TEST(TextureExr, RefusesWhatAHeaderOnlyClaims) {
     huge[at + 2] = 0;
   }
   EXPECT_EQ(test::textureRefusal(huge), "texture 'a' is no readable EXR: it is cut short");
+  std::vector<std::string> names{"R", "G", "B"};
+  for (int i = 0; i < 40; ++i) names.push_back("extra" + std::to_string(i));
+  Bytes wide = exrOf(names, false, {}, 16, 16);
+  const std::size_t wide_window = test::textOf(wide).find("dataWindow") + 11 + 6 + 4;
+  for (const std::size_t at : {wide_window + 8, wide_window + 12}) {
+    wide[at] = 0xFF;
+    wide[at + 1] = 0x0F;
+  }
+  EXPECT_THAT(test::textureRefusal(wide), HasSubstr("texture 'a' has 4096 x 4096 pixels in "));
   // An attribute that claims 1 GB.
   const std::size_t size = text.find("compression", 8) + 12 + 12;
   bytes[size + 3] = 0x40;

@@ -24,8 +24,13 @@ double area(const std::vector<Vec3d>& points, const Mesh::Triangle& triangle) {
 /// over: their signed areas add up to the polygon's in any case.
 void expectCover(const std::vector<Vec3d>& points, const std::vector<std::uint32_t>& polygon) {
   std::vector<Mesh::Triangle> triangles;
-  triangulate(points, polygon, triangles);
+  std::vector<Mesh::Triangle> places;
+  triangulate(points, polygon, triangles, &places);
   ASSERT_EQ(triangles.size(), polygon.size() - 2);
+  ASSERT_EQ(places.size(), triangles.size());
+  for (std::size_t t = 0; t < places.size(); ++t) {
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(polygon[places[t][c]], triangles[t][c]);
+  }
   for (const Mesh::Triangle& triangle : triangles) EXPECT_GE(area(points, triangle), 0.0);
 }
 
