@@ -356,6 +356,15 @@ TEST(Gltf, AMaterialChoosesItsSetOfCoordinatesAndTransformsThem) {
   EXPECT_TRUE(turned[2].eq(Vec2f(2.5F, 0.25F), 1e-6F));
 }
 
+TEST(Gltf, CoordinatesAreReadWithoutATexture) {
+  GltfFile file = textured();
+  file.json["meshes"][0]["primitives"][0].erase("material");
+  const Mesh mesh = parseColours(file.text());
+  ASSERT_NE(mesh.appearance, nullptr);
+  EXPECT_EQ(mesh.appearance->coordinates[0][1], Vec2f(1, 0));
+  EXPECT_THAT(mesh.appearance->textures, IsEmpty());
+}
+
 TEST(Gltf, SamplersWrapAndSmooth) {
   GltfFile file = textured();
   file.json["textures"][0]["sampler"] = 0;
