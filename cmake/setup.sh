@@ -6,7 +6,7 @@ jobs=$(nproc)
 # To build the program, and to make and slice the sample.
 program_packages=(build-essential cmake ninja-build libopenvdb-dev libboost-iostreams-dev libtbb-dev
   zlib1g-dev libopenexr-dev libpng-dev libtiff-dev libminizip-dev libembree-dev libssl-dev nlohmann-json3-dev
-  libturbojpeg0-dev libwebp-dev liblcms2-dev libtinygltf-dev libdraco-dev libmeshoptimizer-dev lib3mf-dev python3)
+  libturbojpeg0-dev libwebp-dev liblcms2-dev libdraco-dev libmeshoptimizer-dev libexpat1-dev python3)
 # To build and run the tests.
 test_packages=(libgtest-dev libgmock-dev libbenchmark-dev libspng-dev libopenvdb-tools
   python3-openvdb python3-numpy python3-pil python3-skimage python3-matplotlib)

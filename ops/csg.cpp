@@ -3,8 +3,10 @@
 #include <array>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "io/vdb/slab_reader.h"
+#include "ops/kernels/colour/csg_colours.h"
 #include "ops/kernels/leaf/part_index.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
@@ -17,6 +19,7 @@ namespace {
 
 using openvdb::FloatGrid;
 using openvdb::Int32Grid;
+using openvdb::Vec3SGrid;
 
 enum class Priority { first, second };
 constexpr std::array<Choice<Priority>, 2> priorities{
@@ -38,7 +41,7 @@ class CsgOperator : public Filter {
     options.file("intersection", intersect_, "FILE.vdb", "Keeps what also lies in this one");
     options.file("difference", subtract_, "FILE.vdb", "Removes this one");
     options.choice("priority", priority_, priorities,
-                   "Whose part, and so whose material, a union has where both are");
+                   "Whose part, material and colour a union has where both are");
   }
 
   Schema plan(const Schema& in) override {
@@ -66,12 +69,15 @@ class CsgOperator : public Filter {
       planParts(in, second, path);
       out.grids[part_grid] = emptyParts(*surface);
     }
+    planValues<Vec3SGrid>(colour_grid, in.grids, second.grids, out.grids);
+    planValues<FloatGrid>(opacity_grid, in.grids, second.grids, out.grids);
     return out;
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
     std::vector<Read> reads{{surface_grid, Reach::point()}};
     if (first_has_parts_) reads.push_back({part_grid, Reach::point()});
+    for (const std::string& name : first_values_) reads.push_back({name, Reach::point()});
     return reads;
   }
 
@@ -87,6 +93,8 @@ class CsgOperator : public Filter {
     const auto others =
         second.contains(surface_grid) ? findGrid<FloatGrid>(second, surface_grid) : empty_;
     Grids out{{surface_grid, combined(*surface, *others, operation_, in.core)}};
+    addValues<Vec3SGrid>(colour_grid, in, *surface, *others, out);
+    addValues<FloatGrid>(opacity_grid, in, *surface, *others, out);
     if (operation_ != Csg::unite) return out;
     const auto parts = first_has_parts_ ? findGrid<Int32Grid>(in.grids, part_grid) : nullptr;
     const auto others_parts = second_has_parts_ && second.contains(part_grid)
@@ -100,6 +108,33 @@ class CsgOperator : public Filter {
   }
 
  private:
+  /// Plans `Cd` or `Alpha`, which the result has if an operand has it.
+  template <class GridT>
+  void planValues(const char* name, const Grids& first, const Grids& second, Grids& out) {
+    if (first.contains(name)) {
+      findGrid<GridT>(first, name);
+      first_values_.emplace_back(name);
+    } else if (second.contains(name)) {
+      out[name] = findGrid<GridT>(second, name);
+      empty_values_[name] = out[name];
+    }
+  }
+
+  template <class GridT>
+  void addValues(const char* name, const Slab& in, const FloatGrid& surface,
+                 const FloatGrid& others, Grids& out) const {
+    const Grids& second = in.inputs.at(0);
+    const auto mine = in.grids.contains(name) ? findGrid<GridT>(in.grids, name) : nullptr;
+    const auto theirs = second.contains(name) ? findGrid<GridT>(second, name) : nullptr;
+    if (!mine && !theirs) {
+      if (const auto empty = empty_values_.find(name); empty != empty_values_.end())
+        out[name] = empty->second;
+      return;
+    }
+    out[name] = combinedValues<GridT>(surface, others, mine.get(), theirs.get(), operation_,
+                                      priority_ == Priority::second, in.core);
+  }
+
   static void checkLattices(const Lattice& first, const Lattice& second, const std::string& path) {
     if (first.pitch_mm == second.pitch_mm && first.origin_mm == second.origin_mm) return;
     if (first.pitch_mm == second.pitch_mm)
@@ -140,7 +175,9 @@ class CsgOperator : public Filter {
 
   Csg operation_ = Csg::unite;
   std::unique_ptr<SlabReader> other_;
-  FloatGrid::ConstPtr empty_;  ///< the second operand's where it has no layers
+  FloatGrid::ConstPtr empty_;              ///< the second operand's where it has no layers
+  std::vector<std::string> first_values_;  ///< the grids of colours that come
+  Grids empty_values_;  ///< those that only the second operand has, where it has no layers
   bool first_has_parts_ = false;
   bool second_has_parts_ = false;
   int first_parts_ = 1;

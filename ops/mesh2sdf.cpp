@@ -1,13 +1,18 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 
+#include "io/file/whole_file.h"
+#include "io/image/texture.h"
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/profile/size_question.h"
 #include "io/profile/target_lattice.h"
+#include "ops/kernels/colour/colour_field.h"
 #include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/leaf/part_index.h"
@@ -27,6 +32,10 @@ namespace vdbdither {
 namespace {
 
 using openvdb::Vec3d;
+
+constexpr std::array<Choice<PartOrder>, 2> overlaps{
+    {{PartOrder::first, "first", "To the first of the parts, in the order of the files"},
+     {PartOrder::last, "last", "To the last of the parts"}}};
 
 /// `surface` from triangle meshes.
 class MeshToSdf : public Source {
@@ -49,23 +58,44 @@ class MeshToSdf : public Source {
     options.flag("normals", extras_.normals, "Adds the grid 'N' of exact unit outward normals");
     options.flag("closest", extras_.closest,
                  "Adds the grid 'closest' with the index of the nearest triangle");
+    options.flag("colour", colour_,
+                 "Adds the grid 'Cd' of the linear red, green and blue of the nearest point of the "
+                 "surface and, where some of the surface is less than opaque, 'Alpha', the "
+                 "opacity. Voxels from one diameter outside to --colour-depth inside have them");
+    options.length("colour-depth", colour_depth_mm_, {0, 1000},
+                   "How far below the surface voxels have a colour");
+    options.file("texture", texture_file_, "FILE",
+                 "Image for the meshes that have texture coordinates but name no image of their "
+                 "own; needs --colour");
+    options.choice("overlap", part_order_, overlaps,
+                   "To which part a voxel belongs that lies in several, and whose colour it has");
   }
 
   Schema plan() override {
     Schema schema;
     const Vec3d pitch_mm = targetPitchMm(target_, schema);
     held_band_mm_ = band_.minimumMm(pitch_mm);
-    std::vector<Mesh> meshes = readMeshes();
-    const double tie_mm = placed(meshes, pitch_mm);
-    questionSize(meshes, schema);
-    const SolidBodies solids = solidsOf(std::move(meshes));
+    std::vector<Mesh> files = readFiles();
+    const double tie_mm = placed(files, pitch_mm);
+    questionSize(files, schema);
+    std::shared_ptr<const SurfaceColours> colours;
+    if (colour_) colours = std::make_shared<SurfaceColours>(files, pitch_mm);
+    const SolidBodies solids = solidsOf(partsOfAll(std::move(files)));
     schema.lattice = latticeOfMesh(solids.whole.mesh, pitch_mm);  // a guess may be larger
     const Lattice& lattice = schema.lattice;
     for (const SolidMesh& part : solids.bodies)
-      parts_.emplace_back(part.mesh, lattice, band_, DistanceExtras{}, part.walls, tie_mm);
+      parts_.emplace_back(part.mesh, lattice, band_, DistanceExtras{.closest = colour_}, part.walls,
+                          tie_mm);
     countLeaves(solids.whole.mesh, schema);
-    field_ = std::make_unique<MeshDistance>(solids.whole.mesh, lattice, band_, extras_,
+    DistanceExtras extras = extras_;
+    extras.closest = extras.closest || colour_;
+    field_ = std::make_unique<MeshDistance>(solids.whole.mesh, lattice, band_, extras,
                                             solids.whole.walls, tie_mm);
+    if (colour_) {
+      colours_.emplace(std::move(colours), lattice, colour_depth_mm_, tie_mm);
+      colours_->add(solids.whole);
+      for (const SolidMesh& part : solids.bodies) colours_->add(part);
+    }
     schema.grids = run({lattice.box.min().z(), lattice.box.min().z()});
     return schema;
   }
@@ -73,6 +103,7 @@ class MeshToSdf : public Source {
   [[nodiscard]] double memoryBytes() const override {
     double bytes = field_->memoryBytes();
     for (const MeshDistance& part : parts_) bytes += part.memoryBytes();
+    if (colours_) bytes += colours_->memoryBytes();
     return bytes;
   }
 
@@ -81,17 +112,27 @@ class MeshToSdf : public Source {
     const double per_leaf = cost::mesh2sdf_us +
                             cost::mesh2sdf_us_per_triangle * triangles_per_leaf_ +
                             (extras_.normals ? cost::mesh2sdf_normals_us : 0) +
-                            (extras_.closest ? cost::mesh2sdf_closest_us : 0);
+                            (extras_.closest || colour_ ? cost::mesh2sdf_closest_us : 0) +
+                            (colour_ ? cost::mesh2sdf_colour_us : 0);
     const double fields = parts_.empty() ? 1 : 2;
     return Work{.us_per_held_leaf = fields * per_leaf};
   }
 
   [[nodiscard]] Grids run(ZRange core) const override {
-    Grids grids = gridsOf(field_->run(core));
-    if (parts_.empty()) return grids;
-    std::vector<openvdb::FloatGrid::ConstPtr> surfaces;
-    for (const MeshDistance& part : parts_) surfaces.push_back(part.run(core).surface);
-    grids[part_grid] = partIndex(surfaces);
+    std::vector<DistanceGrids> bands{field_->run(core)};
+    Grids grids = gridsOf(bands.front());
+    openvdb::Int32Grid::Ptr part_of_voxels;
+    if (!parts_.empty()) {
+      std::vector<openvdb::FloatGrid::ConstPtr> surfaces;
+      for (const MeshDistance& part : parts_)
+        surfaces.push_back(bands.emplace_back(part.run(core)).surface);
+      part_of_voxels = partIndex(surfaces, part_order_);
+      grids[part_grid] = part_of_voxels;
+    }
+    if (!colours_) return grids;
+    const ColourGrids colours = colours_->run(bands, part_of_voxels.get(), core);
+    grids[colour_grid] = colours.colour;
+    if (colours.opacity) grids[opacity_grid] = colours.opacity;
     return grids;
   }
 
@@ -176,19 +217,49 @@ class MeshToSdf : public Source {
     report().count("cut_triangles", static_cast<double>(repairs.cut_triangles));
   }
 
-  std::vector<Mesh> readMeshes() {
-    std::vector<Mesh> meshes;
-    for (const std::string& path : paths_) {
-      Mesh mesh = readMesh(path, [this](const std::string& text) { report().warn(text); });
-      for (Mesh& part : partsOf(std::move(mesh))) {
+  std::vector<Mesh> readFiles() {
+    std::vector<Mesh> files;
+    for (const std::string& path : paths_)
+      files.push_back(readMesh(
+          path, [this](const std::string& text) { report().warn(text); },
+          colour_ ? MeshColours::read : MeshColours::skip));
+    if (!texture_file_.empty()) addTexture(files);
+    const auto has_colours = [](const Mesh& mesh) {
+      return mesh.appearance && mesh.appearance->hasColours();
+    };
+    if (colour_ && std::none_of(files.begin(), files.end(), has_colours))
+      report().warn("--colour: no mesh has colours; all voxels become white");
+    return files;
+  }
+
+  void addTexture(std::vector<Mesh>& files) const {
+    if (!colour_) throw UsageError("--texture needs --colour");
+    const std::string shown = inQuotes(texture_file_);
+    const std::vector<std::uint8_t> bytes = readWholeFile(texture_file_, shown, most_texture_bytes);
+    const Texture texture =
+        decodeTexture({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, shown);
+    bool used = false;
+    for (Mesh& file : files) {
+      if (!file.appearance || file.appearance->coordinates.empty()) continue;
+      used = true;
+      file.appearance = std::make_shared<Appearance>(textured(*file.appearance, texture));
+    }
+    if (!used) throw UsageError("--texture: no mesh has texture coordinates; leave it out");
+  }
+
+  std::vector<Mesh> partsOfAll(std::vector<Mesh> files) const {
+    std::vector<Mesh> parts;
+    for (std::size_t n = 0; n < files.size(); ++n) {
+      files[n].appearance.reset();
+      for (Mesh& part : partsOf(std::move(files[n]))) {
         const std::string flat = whyFlat(part);
         if (!flat.empty())
-          throw DataError(inQuotes(path) + ": bounds no volume: " + flat +
+          throw DataError(inQuotes(paths_[n]) + ": bounds no volume: " + flat +
                           "; give the surface a thickness in a mesh editor first");
-        meshes.push_back(std::move(part));
+        parts.push_back(std::move(part));
       }
     }
-    return meshes;
+    return parts;
   }
 
   /// Warns of a part that is hardly meant to be as large or as small as it is.
@@ -214,6 +285,9 @@ class MeshToSdf : public Source {
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
     const double low = lattice.layers().begin * lattice.pitch_mm.z();
     const double band_mm = band_.maximumMm(lattice.pitch_mm);
+    // On each side of the surface, on average.
+    const double held_mm =
+        colour_ ? std::max(band_mm, 0.5 * (colour_depth_mm_ + lattice.diagonalMm())) : band_mm;
     const int top_row = lattice.layers().size() / leaf_layers + 1;
     std::vector<double> rows(static_cast<std::size_t>(top_row) + 1, 0.0);
     const auto rowAt = [&](double z_mm) {
@@ -239,13 +313,13 @@ class MeshToSdf : public Source {
       const std::size_t first = rowAt(z_low - band_mm);
       const std::size_t last = rowAt(z_high + band_mm);
       for (std::size_t row = first; row <= last; ++row)
-        rows[row] += leavesWithin(band_mm, area, across) / static_cast<double>(last - first + 1);
+        rows[row] += leavesWithin(held_mm, area, across) / static_cast<double>(last - first + 1);
     }
     triangles_per_leaf_ =
         static_cast<double>(mesh.triangles.size()) / leavesWithin(0, area_mm2, across_mm3);
     const double diagonal_mm = lattice.pitch_mm.length();
     schema.footprint = {*std::max_element(rows.begin(), rows.end()),
-                        leavesWithin(band_mm, area_mm2, across_mm3),
+                        leavesWithin(held_mm, area_mm2, across_mm3),
                         leavesWithin(std::min(band_mm, diagonal_mm), area_mm2, across_mm3)};
   }
 
@@ -253,7 +327,7 @@ class MeshToSdf : public Source {
     setHeldBandMm(*made.surface, held_band_mm_);
     Grids grids{{surface_grid, made.surface}};
     if (made.normals) grids[normal_grid] = made.normals;
-    if (made.closest) grids[closest_grid] = made.closest;
+    if (extras_.closest) grids[closest_grid] = made.closest;
     return grids;
   }
 
@@ -263,12 +337,17 @@ class MeshToSdf : public Source {
   bool strict_ = false;
   int refine_y_ = 1;
   DistanceExtras extras_;
+  bool colour_ = false;
+  double colour_depth_mm_ = 1;
+  std::string texture_file_;
+  PartOrder part_order_ = PartOrder::first;
 
   Band band_;
   double held_band_mm_ = 0;
   std::unique_ptr<MeshDistance> field_;
   double triangles_per_leaf_ = 0;    ///< of those that the surface itself meets
   std::vector<MeshDistance> parts_;  ///< of every file, where there are several
+  std::optional<ColourField> colours_;
 };
 
 }  // namespace

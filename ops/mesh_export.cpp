@@ -1,20 +1,31 @@
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include <tbb/parallel_for.h>
+
+#include "io/image/srgb.h"
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_writer.h"
+#include "ops/kernels/colour/nearest_colour.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/mesh/taubin.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
 
 namespace {
+
+using Rgb = std::array<std::uint8_t, 3>;
 
 class MeshExport : public Sink {
  public:
@@ -35,6 +46,10 @@ class MeshExport : public Sink {
     surface_.emplace(in.lattice, *in.grids.at(name_), level_mm_);
     MeshWriter::check(file_, overwrite_.overwrite);
     leaves_ = in.footprint.at_surface;
+    if (in.grids.contains(colour_grid) && meshFormatNamedBy(file_)->holds_extras) {
+      findGrid<openvdb::Vec3SGrid>(in.grids, colour_grid);
+      nearest_.emplace(in.lattice);
+    }
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
@@ -50,19 +65,23 @@ class MeshExport : public Sink {
   }
 
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    if (nearest_) return std::vector<std::string>{name_, colour_grid};
     return std::vector<std::string>{name_};
   }
 
   [[nodiscard]] bool isBarrier() const override { return smooths(); }
 
-  void write(const Slab& in) override { take(surface_->add(in.grids.at(name_), in.core)); }
+  void write(const Slab& in) override {
+    if (nearest_) nearest_->add(findGrid<openvdb::Vec3SGrid>(in.grids, colour_grid));
+    take(surface_->add(in.grids.at(name_), in.core));
+  }
 
   void finish() override {
     take(surface_->finish());
     if (smooths()) {
       smooth(mesh_, taubin(), [this](double fraction) { report().progress(fraction); });
       begin();
-      writer_->add(mesh_.vertices, mesh_.triangles, 0);
+      writer_->add(mesh_.vertices, mesh_.triangles, 0, colours_);
     }
     if (writer_->triangles() == 0)
       throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
@@ -77,16 +96,33 @@ class MeshExport : public Sink {
   [[nodiscard]] Taubin taubin() const { return {.iterations = smoothing_.iterations}; }
 
   void begin() {
-    if (!writer_) writer_ = std::make_unique<MeshWriter>(file_);
+    if (writer_) return;
+    VertexExtras extras;
+    extras.colour = nearest_.has_value();
+    writer_ = std::make_unique<MeshWriter>(file_, extras);
   }
 
-  void take(SurfacePiece piece) {
+  void take(const SurfacePiece& piece) {
+    const std::vector<Rgb> colours = coloursOf(piece);
     if (!smooths()) {
       begin();
-      writer_->add(piece.vertices, piece.triangles, piece.open_from);
+      writer_->add(piece.vertices, piece.triangles, piece.open_from, colours);
       return;
     }
     append(mesh_, piece);
+    colours_.insert(colours_.end(), colours.begin(), colours.end());
+  }
+
+  /// The colours of the vertices: that of the voxel nearest to each, white where there is none.
+  [[nodiscard]] std::vector<Rgb> coloursOf(const SurfacePiece& piece) const {
+    if (!nearest_) return {};
+    std::vector<Rgb> colours(piece.vertices.size());
+    tbb::parallel_for(std::size_t{0}, colours.size(), [&](std::size_t n) {
+      const openvdb::Vec3f colour =
+          nearest_->at(piece.vertices[n]).value_or(openvdb::Vec3f(1, 1, 1));
+      colours[n] = {srgbByteOf(colour.x()), srgbByteOf(colour.y()), srgbByteOf(colour.z())};
+    });
+    return colours;
   }
 
   std::string file_;
@@ -99,7 +135,9 @@ class MeshExport : public Sink {
   double leaves_ = 0;
   std::optional<GridSurface> surface_;
   std::unique_ptr<MeshWriter> writer_;
+  std::optional<NearestColour> nearest_;
   Mesh mesh_;
+  std::vector<Rgb> colours_;  ///< of the vertices of `mesh_`
 };
 
 }  // namespace

@@ -3,22 +3,29 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <tbb/parallel_for.h>
 
 #include "io/file/staged_output.h"
 #include "io/image/exr.h"
 #include "io/image/picture.h"
 #include "io/image/png_spans.h"
+#include "io/image/srgb.h"
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
+#include "ops/kernels/colour/nearest_colour.h"
+#include "ops/kernels/colour/surface_colours.h"
 #include "ops/kernels/contour/grid_surface.h"
 #include "ops/kernels/contour/voxel_faces.h"
 #include "ops/kernels/picture/ray_picture.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
@@ -32,6 +39,11 @@ constexpr std::array<Choice<Look>, 4> looks{
      {Look::staircase, "staircase",
       "A lamp 10 degrees high on the left, so that every step casts a shadow"}}};
 
+enum class Tint { automatic, none };
+constexpr std::array<Choice<Tint>, 2> tints{
+    {{Tint::automatic, "auto", "Those of the grid Cd, or of the mesh, if it has any"},
+     {Tint::none, "none", "None: the surface is white"}}};
+
 enum class Projection { perspective, orthographic };
 constexpr std::array<Choice<Projection>, 2> projections{
     {{Projection::perspective, "perspective", "As seen from --distance"},
@@ -41,15 +53,10 @@ constexpr std::array<Choice<Projection>, 2> projections{
 /// faces the light more.
 double brightnessOf(Look look) { return look == Look::staircase ? 0.2 : 0.6; }
 
-std::uint8_t codedSrgb(double linear) {
-  linear = std::clamp(linear, 0.0, 1.0);
-  const double coded =
-      linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-  return static_cast<std::uint8_t>(std::lround(255 * coded));
-}
-
-Mesh readMeshOf(const std::string& file, Reporter& reporter) {
-  return readMesh(file, [&](const std::string& text) { reporter.warn(text); });
+Mesh readMeshOf(const std::string& file, Reporter& reporter,
+                MeshColours colours = MeshColours::skip) {
+  return readMesh(
+      file, [&](const std::string& text) { reporter.warn(text); }, colours);
 }
 
 /// Draws a surface, wherever it comes from, and writes the picture.
@@ -60,6 +67,7 @@ class SurfacePicture {
     surface_grid_.declare(options);
     options.flag("blocks", blocks_, "Draws the voxels that are inside as blocks");
     options.choice("look", look_, looks, "Light");
+    options.choice("colours", tint_, tints, "Colours of the surface");
     options.number("azimuth", camera_.azimuth_degrees, {-360, 360},
                    "Direction of the eye in degrees: 0 is the front (-y), 90 the right");
     options.number("elevation", camera_.elevation_degrees, {-90, 90},
@@ -90,6 +98,7 @@ class SurfacePicture {
 
   [[nodiscard]] const SurfaceGridOption& surfaceGrid() const { return surface_grid_; }
   [[nodiscard]] bool drawsBlocks() const { return blocks_; }
+  [[nodiscard]] bool drawsColours() const { return tint_ == Tint::automatic; }
 
   [[nodiscard]] std::optional<Work> work(const Lattice& lattice) const {
     const std::optional<double> pixels = drawnPixels(lattice);
@@ -98,14 +107,14 @@ class SurfacePicture {
                 .seconds = 1e-6 * cost::render_us_per_ray * *pixels * samples_};
   }
 
-  void finish(Mesh mesh, Reporter& reporter) {
+  void finish(Mesh mesh, const SurfaceTint& tint, Reporter& reporter) {
     if (frame_file_.empty()) fit(camera_, mesh, margin_);
     reporter.count("triangles", static_cast<double>(mesh.triangles.size()));
     const RayScene scene(mesh);
     mesh = {};
-    const RayPicture picture =
-        scene.picture(camera_, look_, samples_, static_cast<std::uint32_t>(seed_),
-                      [&](double fraction) { reporter.progress(fraction); });
+    const RayPicture picture = scene.picture(
+        camera_, look_, samples_, static_cast<std::uint32_t>(seed_),
+        [&](double fraction) { reporter.progress(fraction); }, tint);
     reporter.count("width", picture.width);
     reporter.count("height", picture.height);
     const double brightness = brightness_.value_or(brightnessOf(look_));
@@ -143,9 +152,10 @@ class SurfacePicture {
         static_cast<std::uint32_t>(picture.width), static_cast<std::uint32_t>(picture.height), {}};
     coded.pixels.reserve(picture.light.size());
     for (std::size_t i = 0; i < picture.light.size(); ++i) {
-      const std::uint8_t grey = codedSrgb(brightness * picture.light[i]);
+      const openvdb::Vec3d light = brightness * openvdb::Vec3d(picture.light[i]);
       const auto cover = static_cast<std::uint8_t>(std::lround(255 * picture.cover[i]));
-      coded.pixels.push_back(rgba(grey, grey, grey, cover));
+      coded.pixels.push_back(
+          rgba(srgbByteOf(light.x()), srgbByteOf(light.y()), srgbByteOf(light.z()), cover));
     }
     return encodePicture(coded);
   }
@@ -159,9 +169,11 @@ class SurfacePicture {
           for (std::size_t x = 0; x < values.size(); ++x) {
             // An OpenEXR's colours are those of the object times what it covers.
             const float cover = picture.cover[begin + x];
-            values[x] = channel == 0
-                            ? cover
-                            : static_cast<float>(brightness * picture.light[begin + x]) * cover;
+            values[x] = cover;
+            if (channel > 0) {
+              const int colour = 3 - static_cast<int>(channel);  // blue, green, red
+              values[x] *= static_cast<float>(brightness * picture.light[begin + x][colour]);
+            }
           }
         });
   }
@@ -170,6 +182,7 @@ class SurfacePicture {
   SurfaceGridOption surface_grid_;
   bool blocks_ = false;
   Look look_ = Look::area;
+  Tint tint_ = Tint::automatic;
   Camera camera_{.azimuth_degrees = 30, .elevation_degrees = 35};
   Projection projection_ = Projection::perspective;
   ViewOptions view_;
@@ -193,6 +206,10 @@ class Render : public Sink {
     lattice_ = in.lattice;
     surface_.emplace(in.lattice, *in.grids.at(name_), std::nullopt);
     if (picture_.drawsBlocks()) faces_.emplace(in.lattice);
+    if (picture_.drawsColours() && in.grids.contains(colour_grid)) {
+      findGrid<openvdb::Vec3SGrid>(in.grids, colour_grid);
+      colours_.emplace(in.lattice);
+    }
     picture_.begin(report());
   }
 
@@ -201,31 +218,54 @@ class Render : public Sink {
   [[nodiscard]] std::optional<Work> work() const override { return picture_.work(lattice_); }
 
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
+    if (colours_) return std::vector<std::string>{name_, colour_grid};
     return std::vector<std::string>{name_};
   }
 
   void write(const Slab& in) override {
     const GridConstPtr& grid = in.grids.at(name_);
-    if (!faces_) return append(mesh_, surface_->add(grid, in.core));
+    if (colours_) colours_->add(findGrid<openvdb::Vec3SGrid>(in.grids, colour_grid));
+    if (!faces_) return take(surface_->add(grid, in.core));
     int z = in.core.begin;
     for (BitLayer& layer : surface_->insideOf(grid, in.core))
-      append(mesh_, faces_->add(std::move(layer), z++));
+      take(faces_->add(std::move(layer), z++));
   }
 
   void finish() override {
-    append(mesh_, faces_ ? faces_->finish() : surface_->finish());
+    take(faces_ ? faces_->finish() : surface_->finish());
     if (mesh_.triangles.empty())
       throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
-    picture_.finish(std::move(mesh_), report());
+    SurfaceTint tint;
+    if (colours_)
+      tint = [this](std::uint32_t triangle, const openvdb::Vec3d&) { return tints_[triangle]; };
+    picture_.finish(std::move(mesh_), tint, report());
   }
 
  private:
+  /// Adds triangles, which have the colour of the voxel nearest to their middle; white where there
+  /// is none.
+  void take(const SurfacePiece& piece) {
+    const std::size_t first = mesh_.triangles.size();
+    append(mesh_, piece);
+    if (!colours_) return;
+    tints_.resize(mesh_.triangles.size());
+    tbb::parallel_for(first, mesh_.triangles.size(), [this](std::size_t t) {
+      const Mesh::Triangle& corners = mesh_.triangles[t];
+      const openvdb::Vec3d middle =
+          (mesh_.vertices[corners[0]] + mesh_.vertices[corners[1]] + mesh_.vertices[corners[2]]) /
+          3.0;
+      tints_[t] = colours_->at(middle).value_or(openvdb::Vec3f(1, 1, 1));
+    });
+  }
+
   SurfacePicture picture_;
   std::string name_;
   Lattice lattice_;
   std::optional<GridSurface> surface_;
   std::optional<VoxelFaces> faces_;
+  std::optional<NearestColour> colours_;
   Mesh mesh_;
+  std::vector<openvdb::Vec3f> tints_;  ///< by triangle, where there are colours
 };
 
 /// The surface of a mesh file.
@@ -242,8 +282,18 @@ class RenderMesh : public Tool {
   void run() override {
     picture_.begin(report());
     if (picture_.drawsBlocks()) throw UsageError("--blocks: a mesh has no voxels");
-    Mesh mesh = readMeshOf(file_, report());
-    picture_.finish(std::move(mesh), report());
+    Mesh mesh = readMeshOf(file_, report(),
+                           picture_.drawsColours() ? MeshColours::read : MeshColours::skip);
+    SurfaceTint tint;
+    if (mesh.appearance) {
+      const auto colours =
+          std::make_shared<SurfaceColours>(std::span(&mesh, 1), openvdb::Vec3d(0.0));
+      tint = [colours](std::uint32_t triangle, const openvdb::Vec3d& p) {
+        const openvdb::Vec4f colour = colours->at(triangle, p);
+        return openvdb::Vec3f(colour.x(), colour.y(), colour.z());
+      };
+    }
+    picture_.finish(std::move(mesh), tint, report());
   }
 
  private:

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <unistd.h>
 
@@ -12,7 +13,9 @@
 #include "ops/kernels/contour/inside_signs.h"
 #include "ops/kernels/distance/zero_set_distance.h"
 #include "ops/kernels/leaf/held_band.h"
+#include "ops/kernels/leaf/sampled_grid.h"
 #include "ops/kernels/mesh/mesh_placement.h"
+#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
@@ -64,6 +67,22 @@ FloatGrid::Ptr fogOf(const GridT& grid) {
   return fog;
 }
 
+/// Whether a name of another program means the same grid of colours.
+bool namesColours(const std::string& name) {
+  return name == colour_grid || name == opacity_grid || name == "alpha";
+}
+
+/// Why a grid cannot be sampled at positions, or nothing.
+std::optional<std::string> sampleProblem(const GridBase& grid) {
+  if (!SampledGrid::takes(grid))
+    return "is of " + grid.valueType() + ", not of float, double, vec3s or vec3d";
+  if (!grid.transform().isLinear()) return "lies in a frustum; only affine transforms will do";
+  if (grid.getVectorType() != openvdb::VEC_INVARIANT)
+    return "holds directions (" + GridBase::vecTypeToString(grid.getVectorType()) +
+           "), which would have to turn with the part; normals makes those of the surface";
+  return std::nullopt;
+}
+
 /// Numbers as floats, and voxels as fog. Null for other types.
 FloatGrid::ConstPtr asFloats(const GridConstPtr& grid) {
   if (auto floats = openvdb::gridConstPtrCast<FloatGrid>(grid)) return floats;
@@ -112,6 +131,11 @@ class Resample : public Source {
     options.length("band", band_mm_, Range::above(0, 1000),
                    "Distance from the surface up to which distances are kept; by default one voxel "
                    "diameter along the normal");
+    options.text(
+        "with", with_, "NAME,...",
+        "Grids of numbers or colours to take along, at the voxels that have a distance, up "
+        "to one voxel diameter outside; 'none' for none; by default 'Cd' and 'Alpha' (or "
+        "'alpha') as far as there are");
   }
 
   Schema plan() override {
@@ -132,12 +156,20 @@ class Resample : public Source {
     schema.footprint = {2 * leaves / rows, leaves, at_surface};
     held_band_mm_ = band.minimumMm(pitch_mm);
     field_ = std::make_unique<ZeroSetDistance>(surface_, schema.lattice, band, slack_mm_);
+    lattice_ = schema.lattice;
+    for (const auto& [name, foreign] : foreign_)
+      carried_.emplace(name, SampledGrid(foreign, mmFromIndex(*foreign)));
+    foreign_.clear();
     const int bottom = schema.lattice.layers().begin;
     schema.grids = run({bottom, bottom});
     return schema;
   }
 
-  [[nodiscard]] double memoryBytes() const override { return surface_->memoryBytes(); }
+  [[nodiscard]] double memoryBytes() const override {
+    double bytes = surface_->memoryBytes();
+    for (const auto& [name, grid] : carried_) bytes += grid.memoryBytes();
+    return bytes;
+  }
 
   [[nodiscard]] std::optional<Work> work() const override {
     return Work{.us_per_held_leaf = cost::resample_us};
@@ -146,7 +178,11 @@ class Resample : public Source {
   [[nodiscard]] Grids run(ZRange core) const override {
     const FloatGrid::Ptr surface = field_->run(core);
     setHeldBandMm(*surface, held_band_mm_);
-    return {{surface_grid, surface}};
+    Grids grids{{surface_grid, surface}};
+    const Vec3d& pitch_mm = lattice_.pitch_mm;
+    for (const auto& [name, grid] : carried_)
+      grids.emplace(name, grid.run(*surface, pitch_mm, pitch_mm.length()));
+    return grids;
   }
 
  private:
@@ -171,6 +207,7 @@ class Resample : public Source {
       throw DataError("grid '" + grid_name_ +
                       "' lies in a frustum; only affine transforms will do");
     checked(Grids::value_type(grid_name_, grid), where);
+    chooseForeign(contents.grids, where);
     tellUnused(contents.grids, is_clear);
     is_voxels_ = isOfVoxels(*grid);
     voxel_mm_ = picoGkVoxelMm(*grid);
@@ -182,13 +219,44 @@ class Resample : public Source {
     return withInside(asFloats(grid));
   }
 
+  [[nodiscard]] bool isToBeCarried(const std::string& name) const {
+    if (with_.empty()) return namesColours(name);
+    const std::vector<std::string> names = commaList(with_);
+    return std::find(names.begin(), names.end(), name) != names.end();
+  }
+
+  /// Keeps the grids that are taken along, under the names that they get.
+  void chooseForeign(const Grids& grids, const std::string& where) {
+    if (with_ == "none") return;
+    if (!with_.empty()) {
+      for (const std::string& name : commaList(with_)) {
+        if (!grids.contains(name)) throw UsageError("--with: no grid '" + name + "' in " + where);
+        if (name == grid_name_ || (name == surface_grid && grid_name_ != name))
+          throw UsageError("--with: '" + name + "' is the name of the surface");
+      }
+    }
+    for (const auto& [name, grid] : grids) {
+      if (name == grid_name_ || !isToBeCarried(name)) continue;
+      if (const auto problem = sampleProblem(*grid)) {
+        const std::string what = "grid '" + name + "' " + *problem;
+        if (!with_.empty()) throw UsageError("--with: " + what);
+        report().warn(what + "; it is not taken along");
+        continue;
+      }
+      checked(Grids::value_type(name, grid), where);
+      const std::string new_name = name == "alpha" ? opacity_grid : name;
+      if (!foreign_.emplace(new_name, grid).second)
+        throw UsageError("--with: both 'Alpha' and 'alpha' become 'Alpha'; name one of them");
+    }
+  }
+
   /// Names the grids that are left out, which may be parts of the same thing. If the user chose
   /// among them, or they are those of a job (`is_clear`), a second grid of the same name is told
   /// only.
   void tellUnused(const Grids& grids, bool is_clear) const {
     std::string others;
     for (const auto& [name, grid] : grids) {
-      if (name == grid_name_) continue;
+      if (name == grid_name_ || foreign_.contains(name == "alpha" ? opacity_grid : name)) continue;
       others += (others.empty() ? "'" : ", '") + name + "' (" + grid->valueType() + ")";
     }
     const bool has_namesake = grids.contains(grid_name_ + "_2");
@@ -238,7 +306,7 @@ class Resample : public Source {
     std::string names;
     for (const auto& [name, grid] : grids) {
       names += " '" + name + "'";
-      if (isOfNumbers(*grid)) numbers.push_back(name);
+      if (isOfNumbers(*grid) && !isToBeCarried(name)) numbers.push_back(name);
       if (isOfVoxels(*grid)) voxels.push_back(name);
     }
     if (grid_name_.empty()) {
@@ -283,14 +351,10 @@ class Resample : public Source {
   }
 
   std::shared_ptr<const ZeroSet> zeroSet(const FloatGrid::ConstPtr& grid, const Vec3d& pitch_mm) {
-    Mat4d map = grid->transform().baseMap()->getAffineMap()->getMat4();
-    if (voxel_mm_) {
+    if (voxel_mm_)
       report().warn("grid '" + grid_name_ + "' comes from PicoGK: its voxels are " +
                     shortestText(*voxel_mm_) + " mm, as its metadata says");
-      map.postScale(Vec3d(*voxel_mm_ * placement_.scale));
-    } else {
-      map.postScale(Vec3d(placement_.mmPerUnit()));
-    }
+    const Mat4d map = mmFromIndex(*grid);
     if (!(std::abs(map.det()) > 0))
       throw DataError("grid '" + grid_name_ + "' has a transform without volume");
     const ZeroSet::Reading reading = readingOf(*grid);
@@ -320,8 +384,16 @@ class Resample : public Source {
                       "; check --kind and --level");
     questionFog(*grid, reading, std::abs(map.det()), surface->cells() * division_mm2_ / 1.5);
     if (!placement_.on_bed) return surface;
-    map.postTranslate(bedCornerMm({pitch_mm, Vec3d(0.0), {}}) - surface->bounds().min);
-    return made(map);
+    moved_mm_ = bedCornerMm({pitch_mm, Vec3d(0.0), {}}) - surface->bounds().min;
+    return made(mmFromIndex(*grid));
+  }
+
+  /// Where the nodes of a grid of the file come to lie.
+  [[nodiscard]] Mat4d mmFromIndex(const GridBase& grid) const {
+    Mat4d map = grid.transform().baseMap()->getAffineMap()->getMat4();
+    map.postScale(Vec3d(voxel_mm_ ? *voxel_mm_ * placement_.scale : placement_.mmPerUnit()));
+    if (placement_.on_bed) map.postTranslate(moved_mm_);
+    return map;
   }
 
   /// Warns of fog whose level was not given and lies far from where the fog begins.
@@ -360,12 +432,17 @@ class Resample : public Source {
   bool asked_level_ = false;
   PlacementOptions placement_;
   std::optional<double> band_mm_;
+  std::string with_;
 
   bool is_voxels_ = false;          ///< a grid of voxels, read as fog of 0 and 1
   std::optional<double> voxel_mm_;  ///< of PicoGK
   double division_mm2_ = 0;         ///< the mean face of a division of a cell
   double slack_mm_ = 0;
   double held_band_mm_ = 0;
+  Vec3d moved_mm_{0.0};  ///< by --place
+  Lattice lattice_;
+  Grids foreign_;                               ///< of the file, to be taken along
+  std::map<std::string, SampledGrid> carried_;  ///< by name
   std::shared_ptr<const ZeroSet> surface_;
   std::unique_ptr<ZeroSetDistance> field_;
 };

@@ -2,6 +2,7 @@
 
 #include "io/image/srgb.h"
 
+#include <algorithm>
 #include <cstddef>
 
 namespace vdbdither {
@@ -37,6 +38,17 @@ const std::array<float, 256>& linearOfSrgbBytes() {
     return values;
   }();
   return table;
+}
+
+std::uint8_t srgbByteOf(double linear) {
+  static const auto steps = [] {
+    std::array<double, 255> between{};
+    for (std::size_t byte = 0; byte < between.size(); ++byte)
+      between[byte] = linearOfSrgb((static_cast<double>(byte) + 0.5) / 255);
+    return between;
+  }();
+  return static_cast<std::uint8_t>(std::upper_bound(steps.begin(), steps.end(), linear) -
+                                   steps.begin());
 }
 
 }  // namespace vdbdither

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 namespace vdbdither {
 
@@ -10,5 +11,9 @@ double linearOfSrgb(double encoded);
 
 /// Returns the same for every byte.
 const std::array<float, 256>& linearOfSrgbBytes();
+
+/// Returns the byte in the encoding of sRGB nearest to `linear` light, 0 … 1. Values outside are
+/// clipped. The result is the same on every machine.
+std::uint8_t srgbByteOf(double linear);
 
 }  // namespace vdbdither

@@ -24,7 +24,8 @@ std::string meshFormatNames() {
 std::string meshEndings(const std::function<bool(const MeshFormat&)>& choose) {
   std::vector<std::string> endings;
   for (const MeshFormat* format : meshFormats()) {
-    if (!choose || choose(*format)) endings.emplace_back(format->ending);
+    if (format->write != nullptr && (!choose || choose(*format)))
+      endings.emplace_back(format->ending);
   }
   return alternatives(endings);
 }

@@ -34,9 +34,9 @@ struct MeshFormat {
   /// Parses `file`. The result may have no triangles and vertices without a triangle; all else is
   /// checked. Throws DataError through `MeshFile::refuse`.
   Mesh (*read)(const MeshFile& file);
-  /// Begins to write the file `path`. Throws DataError.
+  /// Begins to write the file `path`. Throws DataError. Null where the format is only read.
   std::unique_ptr<MeshEncoder> (*write)(const std::filesystem::path& path,
-                                        const VertexExtras& extras);
+                                        const VertexExtras& extras) = nullptr;
 
   bool holds_extras = false;  ///< whether it writes the extras of vertices, or passes over them
   std::uint64_t most = ~std::uint64_t{0};  ///< the maximum number of vertices, and of triangles
@@ -65,7 +65,8 @@ const MeshFormat* meshFormatNamedBy(const std::filesystem::path& path);
 /// Returns "OBJ, PLY or STL": the names of all formats, for messages.
 std::string meshFormatNames();
 
-/// Returns ".obj, .ply or .stl": the endings of all formats, or of those that `choose` takes.
+/// Returns ".obj, .ply or .stl": the endings of all formats that are written, or of those of them
+/// that `choose` takes.
 std::string meshEndings(const std::function<bool(const MeshFormat&)>& choose = {});
 
 }  // namespace vdbdither

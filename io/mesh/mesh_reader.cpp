@@ -26,10 +26,6 @@ constexpr std::array foreign_formats{
     ForeignFormat{"#VRML", "VRML"},
     ForeignFormat{"# vtk", "VTK"},
     ForeignFormat{"Kaydara FBX", "FBX"},
-    ForeignFormat{"PK\x03\x04", "3MF (or another zip archive)"},
-    ForeignFormat{"glTF", "binary glTF (.glb)"},
-    ForeignFormat{"{", "glTF (.gltf, or other JSON)"},
-    ForeignFormat{"DRACO", "Draco (.drc)"},
     ForeignFormat{"ISO-10303-21", "STEP"},
 };
 

@@ -12,7 +12,8 @@ namespace fs = std::filesystem;
 namespace {
 
 const MeshFormat& formatToWrite(const fs::path& path) {
-  if (const MeshFormat* format = meshFormatNamedBy(path)) return *format;
+  const MeshFormat* format = meshFormatNamedBy(path);
+  if (format != nullptr && format->write != nullptr) return *format;
   throw UsageError("'" + path.string() + "' is no mesh file that is written; name a " +
                    meshEndings() + " file");
 }

@@ -95,6 +95,7 @@ bool ObjColours::hasCoordinates(std::size_t triangle, const std::string& texture
   for (const std::uint32_t corner : corners_[triangle]) {
     if (corner == none) return false;
     if (corner < coordinates_.size()) continue;
+    if (texture.empty()) return false;
     file_.refuse("a face with the texture " + inQuotes(texture) +
                  " has texture coordinates that are out of range: the file has " +
                  std::to_string(coordinates_.size()) + "; export it again");
@@ -225,17 +226,18 @@ std::shared_ptr<const Appearance> ObjColours::finish(const Mesh& mesh) {
     }
     has_colours = has_colours || material != nullptr || source == Source::vertices;
     appearance->material.push_back(variant(material_[t], source, *appearance));
-    if (source == Source::texture) {
+    if (source == Source::texture || hasCoordinates(t, "")) {
       appearance->coordinates.resize(mesh.triangles.size());
-      appearance->coordinates[t] = placed(t, *material);
-    } else if (source == Source::vertices) {
+      appearance->coordinates[t] = placed(t, material != nullptr ? *material : MtlMaterial());
+    }
+    if (source == Source::vertices) {
       appearance->colours.resize(mesh.triangles.size(), {Vec4f(1), Vec4f(1), Vec4f(1)});
       for (std::size_t i = 0; i < 3; ++i)
         appearance->colours[t][i] = vertex_colours_[mesh.triangles[t][i]];
     }
   }
   warnOfWhatIsMissing();
-  if (!has_colours) return nullptr;
+  if (!has_colours && appearance->coordinates.empty()) return nullptr;
   appearance->textures = textures_.take();
   return appearance;
 }

@@ -60,6 +60,7 @@ class ObjColours {
   enum class Source { texture, vertices, material };
 
   [[nodiscard]] bool hasColours(const Mesh::Triangle& triangle) const;
+  /// Refuses coordinates out of range if there is a texture that needs them.
   [[nodiscard]] bool hasCoordinates(std::size_t triangle, const std::string& texture) const;
   void readLibraries();
   void readLibrary(std::string_view path);

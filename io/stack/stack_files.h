@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "io/file/staged_output.h"
-#include "io/stack/zip.h"
+#include "io/file/zip.h"
 
 namespace vdbdither {
 

@@ -7,6 +7,8 @@ import subprocess
 import unittest
 import unittest.mock
 
+from PIL import Image
+
 import meshes
 from program import PROGRAM, ROOT, ProgramTest
 
@@ -49,6 +51,8 @@ class Documents(ProgramTest):
                     super().setUp()
                     meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
                     meshes.write_stl(self.folder / "lid.stl", meshes.box((0.6, 0.6, 0.4), (-0.3, -0.3, 0.9)))
+                    meshes.write_textured(self.folder / "part.obj", meshes.sphere(0.8))
+                    Image.linear_gradient("L").convert("RGB").save(self.folder / "texture.png")
                     for line in lines:
                         # Several lines of a block can write the same stack.
                         if "slice-export out" in line:

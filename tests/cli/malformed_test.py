@@ -250,8 +250,8 @@ class Malformed(ProgramTest):
 
     def test_an_archive_of_a_mesh_is_refused(self):
         with zipfile.ZipFile(self.folder / "part.3mf", "w") as archive:
-            archive.writestr("3D/3dmodel.model", "<model/>")
-        self.refuse(1, "is not read yet; export OBJ,", "mesh2sdf", "part.3mf", *MIMAKI, *CHAIN)
+            archive.writestr("part.stl", "solid")
+        self.refuse(1, "'part.3mf': a zip archive without a 3MF model; name the mesh", "mesh2sdf", "part.3mf", *MIMAKI, *CHAIN)
 
     @unittest.skipUnless("VDBDITHER_MODELS" in os.environ, "VDBDITHER_MODELS names no folder of models")
     def test_every_malformed_model_is_repaired_or_refused(self):

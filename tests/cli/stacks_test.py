@@ -149,7 +149,7 @@ class Stacks(ProgramTest):
         for name, message in (("/etc/evil", "its member '/etc/evil' has no proper name: it is an absolute path"),
                               ("../evil", "its member '../evil' has no proper name: it has a folder whose name is '..'"),
                               ("a/../../evil", "has no proper name"), ("C:\\evil", "has no proper name"),
-                              (self.slice().name, "is there twice; pack the folder of the stack again"),
+                              (self.slice().name, "is there twice; pack it again"),
                               ("manifest.json", "its member 'manifest.json' is there twice")):
             with self.subTest(name=name):
                 with warnings.catch_warnings():
@@ -163,7 +163,7 @@ class Stacks(ProgramTest):
         self.pack(members=[(name, bytes(300 << 20))], without=[name])
         self.assertLess((self.folder / "x.zip").stat().st_size, 1 << 20)
         for options in ((), ("--edited",)):
-            self.refuse_import(f"'x.zip': its member '{name}' inflates more than 200 to 1, as no slice does; pack the folder", "x.zip",
+            self.refuse_import(f"'x.zip': its member '{name}' inflates more than 200 to 1; pack it again", "x.zip",
                                *options)
         # The directory lies about the size.
         content = bytearray((self.folder / "x.zip").read_bytes())
@@ -209,11 +209,11 @@ class Stacks(ProgramTest):
         at = content.index(b"PK\1\2")
         content[at + 8] |= 1
         (self.folder / "y.zip").write_bytes(content)
-        self.refuse_import("is encrypted; pack the folder of the stack again", "y.zip")
+        self.refuse_import("is encrypted; pack it again", "y.zip")
 
     def test_a_member_of_an_unknown_method_is_refused(self):
         self.pack(method=zipfile.ZIP_BZIP2)
-        self.refuse_import("is neither stored nor deflated; pack the folder of the stack again", "x.zip")
+        self.refuse_import("is neither stored nor deflated; pack it again", "x.zip")
 
     def test_a_large_manifest_is_refused_before_it_is_read(self):
         os.truncate(self.out / "manifest.json", 200 << 20)

@@ -11,6 +11,7 @@
 #include "tests/support/drawn_grids.h"
 #include "tests/support/filters.h"
 #include "tests/support/mesh_checks.h"
+#include "tests/support/mesh_files.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/sinks.h"
 #include "vdbdither/model/errors.h"
@@ -60,7 +61,7 @@ const double ball_mm3 = 4 * std::numbers::pi / 3 * std::pow(0.6, 3);
 TEST(MeshExport, AGridsSurfaceReadsBackWithoutRepairsInEveryFormat) {
   const test::ScratchFolder scratch;
   for (const std::string grid : {"surface", "solid"}) {
-    for (const MeshFormat* format : meshFormats()) {
+    for (const MeshFormat* format : test::writtenMeshFormats()) {
       const std::string path = scratch / (grid + std::string(format->ending));
       Export({path, "--grid", grid}).run(ball());
       const Mesh mesh = readWhole(path);

@@ -346,5 +346,175 @@ TEST_F(ResampleTest, FogWhoseLevelLiesFarInsideIsAskedAbout) {
                           "--level 50 is half of that"));
 }
 
+/// Colours that tell where they are, in mm, on cubes of 0.3 mm that are turned; active up to
+/// `reach_mm` from the origin.
+openvdb::Vec3SGrid::Ptr positions(double reach_mm, double unit = 1) {
+  const auto grid = openvdb::Vec3SGrid::create();
+  const auto transform = openvdb::math::Transform::createLinearTransform(0.3 * unit);
+  transform->postRotate(0.4, openvdb::math::X_AXIS);
+  grid->setTransform(transform);
+  for (const Coord& ijk : CoordBBox(Coord(-12), Coord(12))) {
+    const Vec3d at = grid->indexToWorld(ijk) / unit;
+    if (at.length() < reach_mm) grid->tree().setValueOn(ijk, openvdb::Vec3s(at));
+  }
+  return grid;
+}
+
+/// All grids that `arguments` make on cubes of 0.1 mm.
+struct Taken {
+  Grids grids;
+  Lattice lattice;
+  std::vector<std::string> warnings;
+};
+
+Taken taken(std::vector<std::string> arguments) {
+  arguments.insert(arguments.end(), {"--pitch", "0.1mm,0.1mm,0.1mm"});
+  const auto verb = findOperator("resample").make();
+  Options options;
+  verb->declare(options);
+  test::Listener listener;
+  verb->setReporter(&listener);
+  options.parse(arguments);
+  auto& source = dynamic_cast<Source&>(*verb);
+  const Schema schema = source.plan();
+  return {source.run(schema.lattice.layers()), schema.lattice, listener.warnings};
+}
+
+/// Expects in `Cd` the position of each voxel that has a distance and is at most one diameter
+/// outside, and nothing elsewhere.
+void expectPositions(const Taken& made, const Vec3d& moved = Vec3d(0.0)) {
+  const auto surface = openvdb::gridConstPtrCast<FloatGrid>(made.grids.at("surface"));
+  const auto colours = openvdb::gridConstPtrCast<openvdb::Vec3SGrid>(made.grids.at("Cd"));
+  ASSERT_NE(colours, nullptr);
+  EXPECT_EQ(colours->transform(), surface->transform());
+  int active = 0;
+  for (const Coord& ijk : made.lattice.box) {
+    const float distance = surface->tree().getValue(ijk);
+    const bool expected = surface->tree().isValueOn(ijk) && distance <= 0.1 * std::sqrt(3);
+    ASSERT_EQ(colours->tree().isValueOn(ijk), expected) << ijk << distance;
+    const Vec3d at = expected ? made.lattice.position(ijk) - moved : Vec3d(0.0);
+    ASSERT_LT((Vec3d(colours->tree().getValue(ijk)) - at).length(), 1e-5) << ijk;
+    active += expected;
+  }
+  EXPECT_GT(active, 1000);
+  EXPECT_EQ(static_cast<int>(colours->activeVoxelCount()), active);
+}
+
+FloatGrid::Ptr ballInFifths() {
+  const auto ball = ballInVoxels();
+  ball->setTransform(fifths());
+  return ball;
+}
+
+TEST_F(ResampleTest, ColoursOfAnotherLatticeAreTakenAlong) {
+  const Taken made = taken({write({{"a", ballInFifths()}, {"Cd", positions(3.4)}})});
+  expectPositions(made);
+  EXPECT_THAT(made.warnings, IsEmpty());
+  EXPECT_EQ(made.grids.size(), 2U);
+}
+
+TEST_F(ResampleTest, ColoursFollowUnitAndPlace) {
+  const auto ball = ballInVoxels();
+  ball->setTransform(openvdb::math::Transform::createLinearTransform(0.0002));
+  const Grids grids{{"a", ball}, {"Cd", positions(3.4, 0.001)}};
+  expectPositions(taken({write(grids), "--unit", "m"}));
+  const Taken placed = taken({write(grids), "--unit", "m", "--place"});
+  const auto first =
+      openvdb::gridConstPtrCast<openvdb::Vec3SGrid>(placed.grids.at("Cd"))->cbeginValueOn();
+  const Vec3d moved = placed.lattice.position(first.getCoord()) - Vec3d(*first);
+  EXPECT_LT((moved - Vec3d(2 - 0.05)).length(), 0.02);
+  expectPositions(placed, moved);
+}
+
+TEST_F(ResampleTest, DoublesAndOtherNamesOfOpacityAreTaken) {
+  const auto alpha = openvdb::DoubleGrid::create(0);
+  alpha->sparseFill(CoordBBox(Coord(-40), Coord(40)), 0.25);
+  alpha->setTransform(fifths());
+  const auto colours = openvdb::Vec3DGrid::create();
+  const auto singles = positions(3.4);
+  colours->setTransform(singles->transform().copy());
+  for (auto value = singles->cbeginValueOn(); value; ++value)
+    colours->tree().setValueOn(value.getCoord(), Vec3d(*value));
+  const Taken made = taken({write({{"a", ballInFifths()}, {"alpha", alpha}, {"Cd", colours}})});
+  expectPositions(made);
+  const auto opacity = openvdb::gridConstPtrCast<FloatGrid>(made.grids.at("Alpha"));
+  ASSERT_NE(opacity, nullptr);
+  EXPECT_EQ(opacity->activeVoxelCount(), made.grids.at("Cd")->activeVoxelCount());
+  for (auto value = opacity->cbeginValueOn(); value; ++value) ASSERT_EQ(*value, 0.25F);
+}
+
+TEST_F(ResampleTest, WhereNoNodeIsActiveThereIsNoColour) {
+  // Half of the ball has colours; at the border those of the active nodes count alone.
+  const auto colours = openvdb::Vec3SGrid::create();
+  colours->setTransform(fifths());
+  colours->sparseFill(CoordBBox(Coord(-40), Coord(0, 40, 40)), openvdb::Vec3s(0.5));
+  const Taken made = taken({write({{"a", ballInFifths()}, {"Cd", colours}})});
+  const auto taken_colours = openvdb::gridConstPtrCast<openvdb::Vec3SGrid>(made.grids.at("Cd"));
+  const auto surface = openvdb::gridConstPtrCast<FloatGrid>(made.grids.at("surface"));
+  int with = 0;
+  int without = 0;
+  for (auto voxel = surface->cbeginValueOn(); voxel; ++voxel) {
+    if (*voxel > 0.1 * std::sqrt(3)) continue;
+    const Coord at = voxel.getCoord();
+    ASSERT_EQ(taken_colours->tree().isValueOn(at), at.x() < 2) << at;
+    const openvdb::Vec3s expected(at.x() < 2 ? 0.5F : 0.0F);
+    ASSERT_EQ(taken_colours->tree().getValue(at), expected) << at;
+    (at.x() < 2 ? with : without) += 1;
+  }
+  EXPECT_GT(with, 1000);
+  EXPECT_GT(without, 1000);
+}
+
+TEST_F(ResampleTest, TakesTheGridsAlongThatItIsTold) {
+  const Grids grids{{"a", ballInFifths()}, {"Cd", positions(3.4)}, {"heat", ballInFifths()}};
+  const Taken heat = taken({write(grids), "--with", "heat"});
+  EXPECT_TRUE(heat.grids.contains("heat"));
+  EXPECT_FALSE(heat.grids.contains("Cd"));
+  EXPECT_THAT(heat.warnings, ElementsAre("only grid 'a' is used, not 'Cd' (vec3s)"));
+  EXPECT_EQ(taken({write(grids), "--grid", "a", "--with", "none"}).grids.size(), 1U);
+  EXPECT_THAT(planning(grids, {"--grid", "a", "--with", "cold"}),
+              ThrowsMessage<UsageError>(HasSubstr("--with: no grid 'cold' in '")));
+  EXPECT_THAT(planning(grids, {"--grid", "a", "--with", "a"}),
+              ThrowsMessage<UsageError>("--with: 'a' is the name of the surface"));
+}
+
+TEST_F(ResampleTest, RefusesToTakeAlongWhatCannotBeSampled) {
+  const auto with = [&](const GridConstPtr& grid) {
+    return planning({{"a", ballInFifths()}, {"v", grid}}, {"--grid", "a", "--with", "v"});
+  };
+  EXPECT_THAT(with(voxelsOfBall<openvdb::BoolGrid>(true)),
+              ThrowsMessage<UsageError>(
+                  "--with: grid 'v' is of bool, not of float, double, vec3s or vec3d"));
+  const auto normals = positions(3.4);
+  normals->setVectorType(openvdb::VEC_COVARIANT_NORMALIZE);
+  EXPECT_THAT(with(normals), ThrowsMessage<UsageError>(HasSubstr("grid 'v' holds directions (")));
+  const auto endless = positions(3.4);
+  endless->tree().setValueOn(Coord(0), openvdb::Vec3s(std::nanf("")));
+  EXPECT_THAT(with(endless), ThrowsMessage<DataError>(HasSubstr("not a finite number")));
+  const Taken left = taken({write({{"a", ballInFifths()}, {"Cd", normals}})});
+  EXPECT_FALSE(left.grids.contains("Cd"));
+  EXPECT_THAT(left.warnings, testing::Contains(HasSubstr("; it is not taken along")));
+}
+
+TEST_F(ResampleTest, ColoursDoNotDependOnTheSlabs) {
+  const auto verb = findOperator("resample").make();
+  Options options;
+  verb->declare(options);
+  const std::vector<std::string> arguments{write({{"a", ballInFifths()}, {"Cd", positions(3.4)}}),
+                                           "--pitch", "0.1mm,0.1mm,0.1mm"};
+  options.parse(arguments);
+  auto& source = dynamic_cast<Source&>(*verb);
+  const ZRange layers = source.plan().lattice.layers();
+  const auto whole = openvdb::gridConstPtrCast<openvdb::Vec3SGrid>(source.run(layers).at("Cd"));
+  openvdb::Index64 active = 0;
+  for (int begin = layers.begin; begin < layers.end; begin += 8) {
+    const ZRange core{begin, std::min(begin + 8, layers.end)};
+    const auto piece = openvdb::gridConstPtrCast<openvdb::Vec3SGrid>(source.run(core).at("Cd"));
+    for (auto voxel = piece->cbeginValueOn(); voxel; ++voxel, ++active)
+      ASSERT_EQ(*voxel, whole->tree().getValue(voxel.getCoord()));
+  }
+  EXPECT_EQ(active, whole->activeVoxelCount());
+}
+
 }  // namespace
 }  // namespace vdbdither

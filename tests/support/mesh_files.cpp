@@ -119,4 +119,12 @@ std::string plyFile(const Mesh& mesh, PlyEncoding encoding, std::string_view coo
   return bytes;
 }
 
+std::vector<const MeshFormat*> writtenMeshFormats() {
+  std::vector<const MeshFormat*> formats;
+  for (const MeshFormat* format : meshFormats()) {
+    if (format->write != nullptr) formats.push_back(format);
+  }
+  return formats;
+}
+
 }  // namespace vdbdither::test

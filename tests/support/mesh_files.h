@@ -2,7 +2,9 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "io/mesh/mesh_format.h"
 #include "vdbdither/model/mesh.h"
 
 namespace vdbdither::test {
@@ -18,5 +20,8 @@ enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
 /// @param index       type of the indices, "int" or "uint16"
 std::string plyFile(const Mesh& mesh, PlyEncoding encoding, std::string_view coordinate = "float",
                     std::string_view index = "int");
+
+/// Returns every registered format that is written as well as read.
+std::vector<const MeshFormat*> writtenMeshFormats();
 
 }  // namespace vdbdither::test

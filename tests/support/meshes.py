@@ -62,3 +62,14 @@ def write_stl(path, triangles):
         file.write(struct.pack("<I", len(triangles)))
         for triangle in triangles:
             file.write(struct.pack("<12fH", 0, 0, 0, *sum(triangle, ()), 0))
+
+
+def write_textured(path, triangles):
+    """Writes an OBJ with texture coordinates that show a texture from the front, and no material."""
+    corners = [corner for triangle in triangles for corner in triangle]
+    low = [min(corner[axis] for corner in corners) for axis in (0, 2)]
+    size = [max(corner[axis] for corner in corners) - least for axis, least in zip((0, 2), low)]
+    lines = [f"v {x} {y} {z}" for x, y, z in corners]
+    lines += [f"vt {(x - low[0]) / size[0]} {(z - low[1]) / size[1]}" for x, _, z in corners]
+    lines += [f"f {n}/{n} {n + 1}/{n + 1} {n + 2}/{n + 2}" for n in range(1, len(corners), 3)]
+    path.write_text("\n".join(lines) + "\n")

@@ -41,6 +41,7 @@ inline constexpr double material_shell_us = 9;
 inline constexpr double material_us = 1;
 inline constexpr double mesh2sdf_us = 2;
 inline constexpr double mesh2sdf_closest_us = 2;
+inline constexpr double mesh2sdf_colour_us = 40;
 inline constexpr double mesh2sdf_normals_us = 8;
 inline constexpr double mesh2sdf_us_per_triangle = 1.2;  ///< of those near the leaf
 inline constexpr double normals_us = 4.7;

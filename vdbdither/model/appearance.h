@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -46,10 +47,21 @@ struct Appearance {
   std::vector<SurfaceMaterial> materials;  ///< at least one where there are triangles
   std::vector<std::uint32_t> material;     ///< by triangle: an index in range
   /// By triangle, of its corners: u from left to right, v from top to bottom, 0 … 1 across the
-  /// texture. Finite.
+  /// texture. Finite. There may be some although there is no texture.
   std::vector<Coordinates> coordinates;
   /// By triangle, of its corners: linear red, green, blue and the opacity, 0 … 1. Finite.
   std::vector<Colours> colours;
+
+  /// Whether anything is not white.
+  [[nodiscard]] bool hasColours() const {
+    return !textures.empty() || !colours.empty() ||
+           std::any_of(materials.begin(), materials.end(), [](const SurfaceMaterial& one) {
+             return one.colour != openvdb::Vec4f(1, 1, 1, 1);
+           });
+  }
 };
+
+/// Returns `appearance` with a texture on the materials that have none, instead of their colour.
+Appearance textured(Appearance appearance, Texture texture);
 
 }  // namespace vdbdither

@@ -24,6 +24,9 @@ namespace vdbdither {
 struct Band {
   double diameters = 1;
   double mm = 0;  ///< the same distance everywhere; replaces diameters if not zero
+  /// Features are searched for voxels inside alone: outside, distances may be too large and
+  /// `closest` wrong. Inside, `closest` is any of several triangles that are nearest.
+  bool inside_only = false;
 
   /// Returns its maximum on a lattice of this pitch.
   [[nodiscard]] double maximumMm(const openvdb::Vec3d& pitch_mm) const {

@@ -145,9 +145,19 @@ void MeshDistance::Block::lower(MeshFeatures::Id id, double band_mm) {
   if (!all_.meets(id, low_mm_, high_mm_)) return;
   const MeshFeature feature = all_.describe(id);
   if (feature.rank == 0) return;
+  const bool inside_only = field_.band_.inside_only;
+  if (inside_only && feature.is_ridge) return;
+  const double outside_mm = inside_only ? field_.tie_mm_ : band_mm;
   LatticeRegion region;
-  region.reach = reachOf(feature.min - feature.below * band_mm - feature.spread_mm,
-                         feature.max + feature.above * band_mm + feature.spread_mm);
+  Vec3d below_mm = feature.below * band_mm;
+  Vec3d above_mm = feature.above * band_mm;
+  if (inside_only && feature.rank == 1) {
+    const Vec3d& normal = feature.distance[0].gradient;
+    for (int axis = 0; axis < 3; ++axis)
+      (normal[axis] < 0 ? below_mm : above_mm)[axis] = std::abs(normal[axis]) * outside_mm;
+  }
+  region.reach = reachOf(feature.min - below_mm - feature.spread_mm,
+                         feature.max + above_mm + feature.spread_mm);
   if (region.reach.empty()) return;
   // The base must not depend on the block or the band, because rounding depends on it.
   region.base = roundedDownAll(feature.min * per_mm_) & ~(edge - 1);
@@ -164,7 +174,7 @@ void MeshDistance::Block::lower(MeshFeatures::Id id, double band_mm) {
                         onLattice(feature.side[s].along, pitch_mm_, base_mm),
                         feature.side[s].length_mm};
     region.spread_mm = feature.spread_mm;
-    region.bound[bounds++] = within(region.distance[0], band_mm, 1);
+    region.bound[bounds++] = within(region.distance[0], outside_mm, 1);
     region.bound[bounds++] = within(region.distance[0], band_mm, -1);
   }
   if (feature.capped)
@@ -280,6 +290,10 @@ void MeshDistance::Block::addExtras(Leaf& leaf, const std::uint32_t* names) cons
   for (auto it = leaf.surface->cbeginValueOn(); it; ++it) {
     const openvdb::Index v = it.pos();
     const MeshFeatures::Id id(names[v]);
+    if (field_.band_.inside_only) {
+      leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(all_.original(all_.ownerOf(id)));
+      continue;
+    }
     const auto [away, triangle] = all_.nearest(id, it.getCoord().asVec3d() * pitch_mm_);
     if (leaf.closest)
       leaf.closest->buffer().data()[v] = static_cast<std::int32_t>(all_.original(triangle));

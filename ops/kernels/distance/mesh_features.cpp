@@ -393,6 +393,7 @@ MeshFeature MeshFeatures::describeEdge(std::uint32_t index) const {
   if (faces == 2) {
     const Vec3d first = outwards[1].dot(normals[0]) < 0 ? -normals[0] : normals[0];
     const Vec3d second = outwards[0].dot(normals[1]) < 0 ? -normals[1] : normals[1];
+    feature.is_ridge = outwards[1].dot(normals[0]) > 0 && outwards[0].dot(normals[1]) > 0;
     const double cosine = first.dot(second);
     if (cosine > 0.1) {
       // No direction between the two reaches farther along an axis than one of them or `tip`.

@@ -36,6 +36,8 @@ struct MeshFeature {
   /// If `capped`, a form in mm that never exceeds the distance in the region.
   LinearForm cap;
   bool capped = false;
+  /// Whether the region of an edge lies wholly on the side that the normals of its faces point to.
+  bool is_ridge = false;
   /// A side of a face: how far a point of the plane lies beyond it and along it, mm.
   struct Side {
     LinearForm outward, along;
@@ -143,6 +145,18 @@ class MeshFeatures {
   };
   /// Returns the nearest point of the feature, whose region must hold `p`.
   [[nodiscard]] Nearest nearest(Id id, const openvdb::Vec3d& p) const;
+
+  /// Returns a triangle that the feature belongs to.
+  [[nodiscard]] std::uint32_t ownerOf(Id id) const {
+    switch (id.kind()) {
+      case Kind::edge:
+        return edges_.halves(id.index()).front() / 3;
+      case Kind::vertex:
+        return edges_.halves(vertex_edges_[first_edge_[id.index()]]).front() / 3;
+      default:
+        return id.index();
+    }
+  }
 
   /// Returns a corner of a triangle, relative to the origin.
   [[nodiscard]] const openvdb::Vec3d& corner(std::uint32_t triangle, int corner) const {

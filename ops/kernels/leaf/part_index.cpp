@@ -1,6 +1,8 @@
 #include "ops/kernels/leaf/part_index.h"
 
+#include <algorithm>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include <openvdb/tools/Prune.h>
@@ -38,7 +40,8 @@ void fillInterior(const FloatGrid& surface, int part, Int32Tree& parts) {
   }
 }
 
-void fillLeaf(Leaf& leaf, std::vector<Accessor>& surfaces) {
+/// `numbers` are those of the surfaces, the part to prefer first.
+void fillLeaf(Leaf& leaf, std::span<const int> numbers, std::vector<Accessor>& surfaces) {
   for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
     const Coord ijk = leaf.offsetToGlobalCoord(n);
     int nearest = 0;
@@ -48,7 +51,7 @@ void fillLeaf(Leaf& leaf, std::vector<Accessor>& surfaces) {
       const bool active = surfaces[part].probeValue(ijk, distance);
       if ((active || distance < 0) && distance < minimum) {
         minimum = distance;
-        nearest = static_cast<int>(part) + 1;
+        nearest = numbers[part];
       }
     }
     if (nearest) {
@@ -61,7 +64,14 @@ void fillLeaf(Leaf& leaf, std::vector<Accessor>& surfaces) {
 
 }  // namespace
 
-openvdb::Int32Grid::Ptr partIndex(std::span<const FloatGrid::ConstPtr> surfaces) {
+openvdb::Int32Grid::Ptr partIndex(std::span<const FloatGrid::ConstPtr> given, PartOrder order) {
+  std::vector<FloatGrid::ConstPtr> surfaces(given.begin(), given.end());
+  std::vector<int> numbers(surfaces.size());
+  std::iota(numbers.begin(), numbers.end(), 1);
+  if (order == PartOrder::last) {
+    std::reverse(surfaces.begin(), surfaces.end());
+    std::reverse(numbers.begin(), numbers.end());
+  }
   auto grid = openvdb::Int32Grid::create(0);
   grid->setName(part_grid);
   grid->insertMeta(part_count_key,
@@ -76,10 +86,10 @@ openvdb::Int32Grid::Ptr partIndex(std::span<const FloatGrid::ConstPtr> surfaces)
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
     std::vector<Accessor> accessors;
     for (const FloatGrid::ConstPtr& surface : surfaces) accessors.emplace_back(surface->tree());
-    fillLeaf(*leaves[i], accessors);
+    fillLeaf(*leaves[i], numbers, accessors);
   });
   for (std::size_t part = 0; part < surfaces.size(); ++part) {
-    fillInterior(*surfaces[part], static_cast<int>(part) + 1, parts);
+    fillInterior(*surfaces[part], numbers[part], parts);
   }
   openvdb::tools::prune(parts);
   return grid;

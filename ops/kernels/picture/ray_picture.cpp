@@ -317,8 +317,9 @@ RayScene::~RayScene() = default;
 /// Draws pixels of one picture. All positions are in the scene's own coordinates.
 class RayScene::Painter {
  public:
-  Painter(const Rays& rays, const Camera& camera, Look look)
+  Painter(const Rays& rays, const Camera& camera, Look look, const SurfaceTint& tint)
       : rays_(rays),
+        tint_(tint),
         camera_(camera),
         lighting_(lightingOf(look, camera)),
         target_(camera.target - rays.centre),
@@ -328,8 +329,8 @@ class RayScene::Painter {
   }
 
   struct Pixel {
-    double light = 0;  ///< the sum over the samples that meet the mesh
-    int covered = 0;   ///< their number
+    Vec3d light{0, 0, 0};  ///< the sum over the samples that meet the mesh
+    int covered = 0;       ///< their number
   };
   [[nodiscard]] Pixel pixel(int column, int row, int samples, std::uint32_t seed) const;
 
@@ -343,6 +344,7 @@ class RayScene::Painter {
                                std::uint32_t pattern) const;
 
   const Rays& rays_;
+  const SurfaceTint& tint_;
   const Camera& camera_;
   Lighting lighting_;
   Vec3d target_;
@@ -413,19 +415,22 @@ RayScene::Painter::Pixel RayScene::Painter::pixel(int column, int row, int sampl
     if (facing == 0) continue;
     const double distance = normal.dot(corner - ray->origin) / facing;
     normal *= (facing > 0 ? -1 : 1) / normal.length();
-    pixel.light +=
-        lightAt(ray->origin + distance * ray->direction + lift * normal, normal, index, place);
+    const Vec3d at = ray->origin + distance * ray->direction;
+    const Vec3d light(lightAt(at + lift * normal, normal, index, place));
+    pixel.light += tint_ ? light * Vec3d(tint_(*triangle, at + rays_.centre)) : light;
   }
   return pixel;
 }
 
 RayPicture RayScene::picture(const Camera& camera, Look look, int samples, std::uint32_t seed,
-                             const std::function<void(double)>& progress) const {
+                             const std::function<void(double)>& progress,
+                             const SurfaceTint& tint) const {
   const std::size_t pixels =
       static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-  RayPicture picture{camera.width, camera.height, std::vector<float>(pixels),
+  RayPicture picture{camera.width, camera.height,
+                     std::vector<openvdb::Vec3f>(pixels, openvdb::Vec3f(0, 0, 0)),
                      std::vector<float>(pixels)};
-  const Painter painter(*rays_, camera, look);
+  const Painter painter(*rays_, camera, look, tint);
   constexpr int rows_at_once = 16;
   for (int begin = 0; begin < camera.height; begin += rows_at_once) {
     progress(static_cast<double>(begin) / camera.height);
@@ -434,7 +439,7 @@ RayPicture RayScene::picture(const Camera& camera, Look look, int samples, std::
         const auto [light, covered] = painter.pixel(column, row, samples, seed);
         const std::size_t at = static_cast<std::size_t>(row) * camera.width + column;
         picture.cover[at] = static_cast<float>(covered) / static_cast<float>(samples);
-        if (covered > 0) picture.light[at] = static_cast<float>(light / covered);
+        if (covered > 0) picture.light[at] = openvdb::Vec3f(light / covered);
       }
     });
   }

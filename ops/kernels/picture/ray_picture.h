@@ -45,13 +45,17 @@ enum class Look {
 /// A rendered picture.
 struct RayPicture {
   int width = 0, height = 0;
-  /// Linear light of the part of a pixel that the object covers; 1 for a perfectly white horizontal
-  /// surface.
-  std::vector<float> light;
+  /// Linear red, green and blue light of the part of a pixel that the object covers; 1 for a
+  /// perfectly white horizontal surface.
+  std::vector<openvdb::Vec3f> light;
   std::vector<float> cover;  ///< the share of a pixel that the object covers
 };
 
-/// A mesh prepared for ray tracing (Embree): white, matt (Lambert), flat facets, direct light only.
+/// Returns the share of red, green and blue light that a point of a triangle of a mesh gives back.
+/// Called by many threads at once.
+using SurfaceTint = std::function<openvdb::Vec3f(std::uint32_t triangle, const openvdb::Vec3d& p)>;
+
+/// A mesh prepared for ray tracing (Embree): matt (Lambert), flat facets, direct light only.
 class RayScene {
  public:
   /// `mesh` in mm. Throws DataError if Embree fails.
@@ -64,8 +68,10 @@ class RayScene {
   /// own pattern, an Owen-scrambled Sobol sequence (Burley 2020), scrambled by its place and
   /// `seed`; and of triangles that a ray meets at the same place the one with the lowest index
   /// counts.
+  /// @param tint  empty for a white surface
   [[nodiscard]] RayPicture picture(const Camera& camera, Look look, int samples, std::uint32_t seed,
-                                   const std::function<void(double)>& progress) const;
+                                   const std::function<void(double)>& progress,
+                                   const SurfaceTint& tint = {}) const;
 
  private:
   struct Rays;

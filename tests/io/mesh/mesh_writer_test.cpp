@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "io/mesh/mesh_reader.h"
+#include "tests/support/mesh_files.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"
 #include "vdbdither/model/errors.h"
@@ -28,7 +29,7 @@ std::string textOf(const std::filesystem::path& path) {
 TEST(MeshWriter, TheFileAppearsWhenItIsComplete) {
   const test::ScratchFolder scratch;
   const Mesh mesh = torus();
-  for (const MeshFormat* format : meshFormats()) {
+  for (const MeshFormat* format : test::writtenMeshFormats()) {
     const std::string name = "a" + std::string(format->ending);
     MeshWriter writer(scratch / name);
     writer.add(mesh.vertices, mesh.triangles, 0);

@@ -33,8 +33,10 @@ Camera fromAbove(const Mesh& mesh, double pixel_mm, double distance_mm = 0) {
 float lightAt(const RayPicture& picture, const Camera& camera, double x_mm, double y_mm) {
   const int column = static_cast<int>(std::floor(x_mm / camera.pixel_mm)) - camera.left;
   const int row = camera.top - 1 - static_cast<int>(std::floor(y_mm / camera.pixel_mm));
-  return picture.light.at(static_cast<std::size_t>(row) * static_cast<std::size_t>(picture.width) +
-                          static_cast<std::size_t>(column));
+  return picture.light
+      .at(static_cast<std::size_t>(row) * static_cast<std::size_t>(picture.width) +
+          static_cast<std::size_t>(column))
+      .x();
 }
 
 TEST(RayPicture, AHorizontalOpenPlaceGetsTheSameFromEveryLight) {
@@ -74,6 +76,23 @@ TEST(RayPicture, WhatLiesInAShadowGetsNoneOfTheLamp) {
   EXPECT_GT(lightAt(picture, camera, 2.5, up), 0.9);
 }
 
+TEST(RayPicture, ATintTakesItsShareOfTheLight) {
+  const Mesh plate = test::boxMesh({-3, -2, -0.5}, {3, 2, 0.5});
+  const Camera camera = fromAbove(plate, 0.25);
+  const RayScene scene(plate);
+  const RayPicture white = scene.picture(camera, Look::sky, 16, 0, ignore);
+  const RayPicture tinted =
+      scene.picture(camera, Look::sky, 16, 0, ignore, [](std::uint32_t, const openvdb::Vec3d& p) {
+        return p.x() < 0 ? openvdb::Vec3f(1, 0.5F, 0) : openvdb::Vec3f(0, 0.25F, 1);
+      });
+  const auto at = [&](const RayPicture& picture, int column) {
+    return picture.light.at(static_cast<std::size_t>(picture.height / 2 * picture.width + column));
+  };
+  for (const auto& [column, tint] :
+       {std::pair(5, openvdb::Vec3f(1, 0.5F, 0)), std::pair(20, openvdb::Vec3f(0, 0.25F, 1))})
+    EXPECT_LT((at(tinted, column) - at(white, column) * tint).length(), 1e-6F) << column;
+}
+
 TEST(RayPicture, TheCoverIsWhatTheObjectTakesOfThePixels) {
   const Mesh plate = test::boxMesh({0, 0, 0}, {2.13, 1.37, 1});
   const Camera camera = fromAbove(plate, 0.1);
@@ -81,7 +100,7 @@ TEST(RayPicture, TheCoverIsWhatTheObjectTakesOfThePixels) {
   const double pixels = std::accumulate(picture.cover.begin(), picture.cover.end(), 0.0);
   EXPECT_NEAR(pixels * 0.01, 2.13 * 1.37, 0.01);
   EXPECT_EQ(picture.cover.front(), 0);
-  EXPECT_EQ(picture.light.front(), 0);
+  EXPECT_EQ(picture.light.front(), openvdb::Vec3f(0, 0, 0));
 }
 
 TEST(RayPicture, NearerThingsAreLargerInPerspective) {

@@ -1,9 +1,10 @@
-#include "io/stack/zip.h"
+#include "io/file/zip.h"
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <memory>
 #include <minizip/unzip.h>
 #include <minizip/zip.h>
 #include <utility>
@@ -28,6 +29,54 @@ constexpr std::uint64_t most_inflation = 200;
 
 /// A bit of the flags of a member.
 constexpr std::uint64_t is_encrypted = 1;
+
+/// Bytes in memory, as minizip reads a file.
+struct MemoryFile {
+  std::span<const std::uint8_t> bytes;
+  std::uint64_t at = 0;
+};
+
+MemoryFile& memoryFile(void* stream) { return *static_cast<MemoryFile*>(stream); }
+
+uLong readMemory(void* /*opaque*/, void* stream, void* to, uLong count) {
+  MemoryFile& file = memoryFile(stream);
+  const std::size_t taken = std::min<std::uint64_t>(count, file.bytes.size() - file.at);
+  std::copy_n(file.bytes.begin() + static_cast<std::ptrdiff_t>(file.at), taken,
+              static_cast<std::uint8_t*>(to));
+  file.at += taken;
+  return taken;
+}
+
+long seekMemory(void* /*opaque*/, void* stream, ZPOS64_T offset, int origin) {
+  MemoryFile& file = memoryFile(stream);
+  const std::uint64_t size = file.bytes.size();
+  const std::uint64_t from = origin == ZLIB_FILEFUNC_SEEK_SET   ? 0
+                             : origin == ZLIB_FILEFUNC_SEEK_CUR ? file.at
+                                                                : size;
+  if (offset > size - from) return -1;
+  file.at = from + offset;
+  return 0;
+}
+
+zlib_filefunc64_def memoryFunctions(std::span<const std::uint8_t>& bytes) {
+  zlib_filefunc64_def functions{};
+  functions.zopen64_file = [](void* opaque, const void* /*name*/, int /*mode*/) -> void* {
+    return std::make_unique<MemoryFile>(
+               MemoryFile{*static_cast<std::span<const std::uint8_t>*>(opaque)})
+        .release();
+  };
+  functions.zread_file = readMemory;
+  functions.zwrite_file = [](void*, void*, const void*, uLong) -> uLong { return 0; };
+  functions.ztell64_file = [](void*, void* stream) -> ZPOS64_T { return memoryFile(stream).at; };
+  functions.zseek64_file = seekMemory;
+  functions.zclose_file = [](void*, void* stream) {
+    const std::unique_ptr<MemoryFile> closed(&memoryFile(stream));
+    return 0;
+  };
+  functions.zerror_file = [](void*, void*) { return 0; };
+  functions.opaque = &bytes;
+  return functions;
+}
 
 }  // namespace
 
@@ -73,12 +122,22 @@ void ZipWriter::finish() {
   if (zipClose(std::exchange(file_, nullptr), nullptr) != ZIP_OK) fail();
 }
 
-ZipReader::ZipReader(const std::filesystem::path& path) : path_(path) {
+ZipReader::ZipReader(const std::filesystem::path& path) : shown_("'" + path.string() + "'") {
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none))
-    throw DataError("'" + path.string() + "' is not an ordinary file");
-  file_ = unzOpen64(path.c_str());
-  if (!file_) throw DataError("'" + path.string() + "' is not a readable zip archive");
+    throw DataError(shown_ + " is not an ordinary file");
+  takeOver(unzOpen64(path.c_str()));
+}
+
+ZipReader::ZipReader(std::span<const std::uint8_t> bytes, std::string shown)
+    : shown_(std::move(shown)) {
+  zlib_filefunc64_def functions = memoryFunctions(bytes);
+  takeOver(unzOpen2_64("", &functions));
+}
+
+void ZipReader::takeOver(void* opened) {
+  file_ = opened;
+  if (!file_) throw DataError(shown_ + " is not a readable zip archive");
   try {
     readDirectory();
   } catch (...) {
@@ -90,12 +149,11 @@ ZipReader::ZipReader(const std::filesystem::path& path) : path_(path) {
 ZipReader::~ZipReader() { unzClose(file_); }
 
 void ZipReader::readDirectory() {
-  const std::string archive = "'" + path_.string() + "'";
   unz_global_info64 all{};
   if (unzGetGlobalInfo64(file_, &all) != UNZ_OK)
-    throw DataError(archive + " is not a readable zip archive");
+    throw DataError(shown_ + " is not a readable zip archive");
   if (all.number_entry > most_members) {
-    throw DataError(archive + " has " + std::to_string(all.number_entry) + " members; at most " +
+    throw DataError(shown_ + " has " + std::to_string(all.number_entry) + " members; at most " +
                     std::to_string(most_members) + " are read");
   }
   // The number has 16 bits in an archive without a zip64 record, and is this one for all from
@@ -110,15 +168,14 @@ void ZipReader::readDirectory() {
                                 nullptr, 0) != UNZ_OK ||
         unzGetFilePos64(file_, &place) != UNZ_OK) {
       if (all.number_entry == uncounted && i >= uncounted) return;
-      throw DataError(archive + " is damaged: its directory ends after " + std::to_string(i) +
+      throw DataError(shown_ + " is damaged: its directory ends after " + std::to_string(i) +
                       " of " + std::to_string(all.number_entry) + " members");
     }
     std::string name(text.data(), std::min<std::size_t>(information.size_filename, text.size()));
     const bool is_folder = name.size() > 1 && name.ends_with('/');
     if (is_folder) name.pop_back();
     const auto refuse = [&](const std::string& why) {
-      throw DataError(archive + ": its member '" + name + "' " + why +
-                      "; pack the folder of the stack again");
+      throw DataError(shown_ + ": its member '" + name + "' " + why + "; pack it again");
     };
     if (const auto problem = relativePathProblem(name))
       refuse("has no proper name: it " + *problem);
@@ -128,7 +185,7 @@ void ZipReader::readDirectory() {
       refuse("is neither stored nor deflated");
     if (information.uncompressed_size > always_inflated &&
         information.uncompressed_size / most_inflation > information.compressed_size)
-      refuse("inflates more than 200 to 1, as no slice does");
+      refuse("inflates more than 200 to 1");
     if (members_.size() == most_members) refuse("is one too many");
     const Member member{place.pos_in_zip_directory, place.num_of_file,
                         information.uncompressed_size};
@@ -143,17 +200,29 @@ std::vector<std::string> ZipReader::names() const {
 }
 
 std::string ZipReader::shown(const std::string& name) const {
-  return "'" + path_.string() + "': its file '" + name + "'";
+  return shown_ + ": its file '" + name + "'";
 }
 
 const ZipReader::Member& ZipReader::member(const std::string& name) const {
   const auto found = members_.find(name);
-  if (found == members_.end())
-    throw DataError("'" + path_.string() + "' holds no file '" + name + "'");
+  if (found == members_.end()) throw DataError(shown_ + " holds no file '" + name + "'");
   return found->second;
 }
 
 std::vector<std::uint8_t> ZipReader::read(const std::string& name, std::uint64_t most_bytes) {
+  std::vector<std::uint8_t> bytes;
+  // Room grows with what comes: a damaged length must not ask for all of memory.
+  constexpr std::uint64_t step = 1 << 20;
+  read(name, most_bytes, [&](std::span<const std::uint8_t> piece) {
+    if (bytes.capacity() - bytes.size() < piece.size())
+      bytes.reserve(std::min(std::max(2 * bytes.size(), step), size(name)));
+    bytes.insert(bytes.end(), piece.begin(), piece.end());
+  });
+  return bytes;
+}
+
+void ZipReader::read(const std::string& name, std::uint64_t most_bytes,
+                     const std::function<void(std::span<const std::uint8_t>)>& take) {
   const Member& found = member(name);
   if (found.bytes > most_bytes) throw DataError(tooLarge(shown(name), found.bytes, most_bytes));
   const std::lock_guard lock(mutex_);
@@ -161,19 +230,16 @@ std::vector<std::uint8_t> ZipReader::read(const std::string& name, std::uint64_t
   const auto failed = [&] { return DataError(shown(name) + " is damaged"); };
   if (unzGoToFilePos64(file_, &place) != UNZ_OK || unzOpenCurrentFile(file_) != UNZ_OK)
     throw failed();
-  std::vector<std::uint8_t> bytes;
-  // Room grows with what comes: a damaged length must not ask for all of memory.
-  constexpr std::uint64_t step = 1 << 20;
+  std::vector<std::uint8_t> piece(std::size_t{1} << 16);
+  std::uint64_t left = found.bytes;
   for (int count = 1; count > 0;) {
-    const std::size_t begin = bytes.size();
-    const std::uint64_t wanted = std::min(step, found.bytes - begin);
-    bytes.resize(begin + wanted);
-    count = unzReadCurrentFile(file_, bytes.data() + begin, static_cast<unsigned>(wanted));
-    bytes.resize(begin + static_cast<std::size_t>(std::max(count, 0)));
+    const auto wanted = static_cast<unsigned>(std::min<std::uint64_t>(piece.size(), left));
+    count = unzReadCurrentFile(file_, piece.data(), wanted);
     if (count < 0) throw failed();
+    left -= static_cast<unsigned>(count);
+    if (count > 0) take(std::span(piece).first(static_cast<std::size_t>(count)));
   }
-  if (unzCloseCurrentFile(file_) != UNZ_OK || bytes.size() != found.bytes) throw failed();
-  return bytes;
+  if (unzCloseCurrentFile(file_) != UNZ_OK || left != 0) throw failed();
 }
 
 }  // namespace vdbdither

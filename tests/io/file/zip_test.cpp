@@ -1,4 +1,4 @@
-#include "io/stack/zip.h"
+#include "io/file/zip.h"
 
 #include <fstream>
 #include <string>
@@ -104,8 +104,8 @@ TEST(Zip, RefusesNamesThatLeaveTheFolderAndNamesThatAreThereTwice) {
   for (const auto& [name, why] : refusals) {
     const std::filesystem::path archive = archiveOf(scratch, {"one", name});
     EXPECT_THAT([&] { ZipReader{archive}; },
-                ThrowsMessage<DataError>(HasSubstr(": its member '" + name + "' " + why +
-                                                   "; pack the folder of the stack again")));
+                ThrowsMessage<DataError>(
+                    HasSubstr(": its member '" + name + "' " + why + "; pack it again")));
   }
 }
 
@@ -146,6 +146,28 @@ TEST(Zip, RefusesVeryManyMembersWhateverTheArchiveStates) {
   writer.finish();
   EXPECT_THAT([&] { ZipReader(scratch / "a.zip"); },
               ThrowsMessage<DataError>(HasSubstr("its member '262144' is one too many; pack")));
+}
+
+TEST(Zip, ReadsAnArchiveInMemory) {
+  const test::ScratchFolder scratch;
+  ZipWriter writer(scratch / "a.zip", "a.zip");
+  writer.add("one", bytesOf("first"));
+  writer.add("long", Bytes(200000, 7));
+  writer.finish();
+  Bytes bytes = test::fileBytes(scratch / "a.zip");
+  ZipReader reader(bytes, "'it'");
+  EXPECT_EQ(reader.read("one", any), bytesOf("first"));
+  std::size_t pieces = 0;
+  Bytes joined;
+  reader.read("long", any, [&](std::span<const std::uint8_t> piece) {
+    ++pieces;
+    joined.insert(joined.end(), piece.begin(), piece.end());
+  });
+  EXPECT_EQ(joined, Bytes(200000, 7));
+  EXPECT_EQ(pieces, 4U);
+  bytes.resize(bytes.size() - 30);
+  EXPECT_THAT([&] { ZipReader(bytes, "'it'"); },
+              ThrowsMessage<DataError>("'it' is not a readable zip archive"));
 }
 
 TEST(Zip, IsAnOrdinaryFile) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <span>
@@ -38,6 +39,10 @@ class ZipReader {
   /// Throws DataError if the file is not a zip archive, or if members are encrypted, share a name
   /// or could be unpacked outside of a folder.
   explicit ZipReader(const std::filesystem::path& path);
+  /// Reads an archive that lies in memory, with the same errors.
+  /// @param bytes  must outlive the object
+  /// @param shown  what messages call it: its name in quotes
+  ZipReader(std::span<const std::uint8_t> bytes, std::string shown);
   ZipReader(const ZipReader&) = delete;
   ZipReader& operator=(const ZipReader&) = delete;
   ~ZipReader();
@@ -53,6 +58,11 @@ class ZipReader {
   /// checksum is wrong. Never takes more memory than the stated size.
   [[nodiscard]] std::vector<std::uint8_t> read(const std::string& name, std::uint64_t most_bytes);
 
+  /// Passes the file on in pieces of up to 64 KiB, with the same errors. The checksum is compared
+  /// behind the last piece.
+  void read(const std::string& name, std::uint64_t most_bytes,
+            const std::function<void(std::span<const std::uint8_t>)>& take);
+
  private:
   /// Where a file lies: in the archive's directory, and its number there.
   struct Member {
@@ -61,11 +71,12 @@ class ZipReader {
     std::uint64_t bytes = 0;  ///< unpacked
   };
 
+  void takeOver(void* opened);
   void readDirectory();
   [[nodiscard]] const Member& member(const std::string& name) const;
   [[nodiscard]] std::string shown(const std::string& name) const;
 
-  std::filesystem::path path_;
+  std::string shown_;  ///< the archive, in quotes
   void* file_ = nullptr;
   std::map<std::string, Member> members_;
   std::mutex mutex_;

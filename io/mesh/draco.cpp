@@ -1,0 +1,172 @@
+// Draco files: "Draco Bitstream Specification", version 2.2, Google, 2021.
+// https://google.github.io/draco/spec/
+
+#include <algorithm>
+#include <cstdint>
+#include <draco/compression/expert_encode.h>
+#include <draco/core/encoder_buffer.h>
+#include <draco/mesh/mesh.h>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/image/srgb.h"
+#include "io/mesh/draco_mesh.h"
+#include "io/mesh/mesh_format.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
+
+namespace vdbdither {
+
+using openvdb::Vec3d;
+
+namespace {
+
+std::vector<Vec3d> verticesOf(const MeshFile& file, const DracoValues& positions) {
+  if (positions.components != 3)
+    file.refuse("the Draco data have no positions with three coordinates; export it again");
+  std::vector<Vec3d> vertices(positions.values.size() / 3);
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    vertices[i] = Vec3d(&positions.values[3 * i]);
+    if (!isFinite(vertices[i])) {
+      file.refuse("vertex " + std::to_string(i + 1) + " is not finite (" + shown(vertices[i]) +
+                  "); repair the mesh");
+    }
+  }
+  return vertices;
+}
+
+/// The colours are encoded like sRGB, whether they are bytes or 0 … 1, as PLY has them.
+float linearColour(const DracoValues& colours, double value) {
+  if (colours.is_integer && colours.one == 255)
+    return linearOfSrgbBytes()[static_cast<std::size_t>(value)];
+  return static_cast<float>(linearOfSrgb(value / colours.one));
+}
+
+std::vector<openvdb::Vec4f> linearColours(const DracoValues& colours) {
+  const auto components = static_cast<std::size_t>(colours.components);
+  std::vector<openvdb::Vec4f> linear(colours.values.size() / components,
+                                     openvdb::Vec4f(0, 0, 0, 1));
+  // One or two components are a grey, and its opacity.
+  const bool is_grey = components < 3;
+  for (std::size_t i = 0; i < linear.size(); ++i) {
+    const double* value = &colours.values[i * components];
+    for (int c = 0; c < 3; ++c) linear[i][c] = linearColour(colours, value[is_grey ? 0 : c]);
+    if (components % 2 != 0) continue;
+    const double opacity = value[components - 1] / colours.one;
+    linear[i][3] = opacity > 0 ? static_cast<float>(std::min(opacity, 1.0)) : 0;
+  }
+  return linear;
+}
+
+void addColours(const MeshFile& file, const DracoValues& colours,
+                const std::vector<Mesh::Triangle>& points, Mesh& mesh) {
+  if (colours.components == 0) return;
+  if (colours.components > 4) {
+    file.warn("ignored colours with " + std::to_string(colours.components) + " components");
+    return;
+  }
+  const std::vector<openvdb::Vec4f> linear = linearColours(colours);
+  auto appearance = std::make_shared<Appearance>();
+  appearance->materials.emplace_back();
+  appearance->material.assign(points.size(), 0);
+  appearance->colours.resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t corner = 0; corner < 3; ++corner)
+      appearance->colours[i][corner] = linear[colours.of_point[points[i][corner]]];
+  }
+  mesh.appearance = std::move(appearance);
+}
+
+/// Points that differ only in other attributes share a vertex already: their value is the same.
+Mesh readDraco(const MeshFile& file) {
+  try {
+    const DracoMesh draco(file.bytes());
+    const DracoValues positions = draco.values(DracoAttribute::position);
+    Mesh mesh;
+    mesh.vertices = verticesOf(file, positions);
+    mesh.triangles = draco.triangles();
+    if (file.wantsColours())
+      addColours(file, draco.values(DracoAttribute::colour), mesh.triangles, mesh);
+    for (Mesh::Triangle& triangle : mesh.triangles) {
+      for (std::uint32_t& vertex : triangle) vertex = positions.of_point[vertex];
+    }
+    return mesh;
+  } catch (const DracoError& error) {
+    file.refuse(std::string("the Draco data ") + error.what() + "; export or download it again");
+  }
+}
+
+MeshMatch matchDraco(const MeshFile& file) {
+  return file.head().starts_with("DRACO") ? MeshMatch::signature : MeshMatch::none;
+}
+
+/// Keeps the mesh: Draco encodes it as a whole. Nothing is quantized, and the order stays.
+class DracoEncoder : public MeshEncoder {
+ public:
+  DracoEncoder(const std::filesystem::path& path, const VertexExtras& extras)
+      : MeshEncoder(path), extras_(extras) {}
+
+  void vertex(const MeshVertex& vertex) override {
+    positions_.push_back(vertex.position);
+    if (extras_.colour) colours_.push_back(vertex.colour);
+    if (extras_.quality) qualities_.push_back(vertex.quality);
+  }
+
+  void triangle(const Mesh::Triangle& triangle) override {
+    mesh_.AddFace({draco::PointIndex(triangle[0]), draco::PointIndex(triangle[1]),
+                   draco::PointIndex(triangle[2])});
+  }
+
+ protected:
+  void finish(std::uint64_t vertices, std::uint64_t /*triangles*/) override {
+    mesh_.set_num_points(static_cast<std::uint32_t>(vertices));
+    addAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32, positions_);
+    addAttribute(draco::GeometryAttribute::COLOR, 3, draco::DT_UINT8, colours_);
+    addAttribute(draco::GeometryAttribute::GENERIC, 1, draco::DT_FLOAT32, qualities_);
+    throwIfInterrupted();
+    draco::ExpertEncoder encoder(mesh_);
+    encoder.SetEncodingMethod(draco::MESH_SEQUENTIAL_ENCODING);
+    encoder.options().SetGlobalBool("compress_connectivity", true);
+    draco::EncoderBuffer buffer;
+    if (!encoder.EncodeToBuffer(&buffer).ok())
+      throw DataError("the mesh cannot be encoded by Draco; write another format");
+    throwIfInterrupted();
+    file_.append(buffer.data(), buffer.size());
+  }
+
+ private:
+  template <class Value>
+  void addAttribute(draco::GeometryAttribute::Type type, int components, draco::DataType data_type,
+                    std::vector<Value>& values) {
+    if (values.empty()) return;
+    auto attribute = std::make_unique<draco::PointAttribute>();
+    attribute->Init(type, static_cast<std::int8_t>(components), data_type,
+                    type == draco::GeometryAttribute::COLOR, values.size());
+    attribute->buffer()->Write(0, values.data(), values.size() * sizeof(Value));
+    mesh_.AddAttribute(std::move(attribute));
+    values = {};
+  }
+
+  VertexExtras extras_;
+  draco::Mesh mesh_;
+  std::vector<openvdb::Vec3s> positions_;
+  std::vector<std::array<std::uint8_t, 3>> colours_;
+  std::vector<float> qualities_;
+};
+
+}  // namespace
+
+extern const MeshFormat draco;
+const MeshFormat draco{.name = "Draco",
+                       .ending = ".drc",
+                       .match = matchDraco,
+                       .read = readDraco,
+                       .write = makeMeshEncoder<DracoEncoder>,
+                       .holds_extras = true,
+                       .most = (std::uint64_t{1} << 31) / sizeof(openvdb::Vec3s),
+                       .bytes_per_vertex = 24,
+                       .us_per_vertex = 0.3};
+
+}  // namespace vdbdither

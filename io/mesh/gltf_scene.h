@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <openvdb/math/Mat4.h>
+
+#include "io/mesh/gltf_json.h"
+
+namespace vdbdither {
+
+/// A mesh as a node of a scene places it.
+struct GltfInstance {
+  std::uint64_t mesh = 0;
+  std::string name;         ///< of the node or of its mesh; empty where neither has one
+  openvdb::Mat4d to_world;  ///< for column vectors, in the units of the file
+};
+
+struct GltfScene {
+  std::vector<GltfInstance> instances;  ///< a node before its children, in the order of the file
+  std::uint64_t skinned = 0;            ///< nodes whose mesh bones would bend
+  std::uint64_t repeated = 0;  ///< nodes that EXT_mesh_gpu_instancing would draw several times
+};
+
+/// Walks through the default scene, through all scenes where none is the default, and through all
+/// nodes where there are no scenes. Refuses nodes that are reached twice, such as cycles, and trees
+/// of more than 64 levels.
+GltfScene readGltfScene(const GltfValue& root);
+
+}  // namespace vdbdither
