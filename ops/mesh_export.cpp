@@ -30,7 +30,8 @@ using Rgb = std::array<std::uint8_t, 3>;
 class MeshExport : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", file_, "Mesh to write: " + meshEndings());
+    options.positional("file", file_,
+                       "Mesh to write, its coordinates exact as floats: " + meshEndings());
     surface_grid_.declare(options);
     options.length("level", level_mm_, {-1000, 1000},
                    "Level of the surface, in place of 0 in a distance (mm) or 0.5 in a share of "

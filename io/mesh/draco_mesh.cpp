@@ -21,12 +21,13 @@ namespace vdbdither {
 
 namespace {
 
-/// What the decoder takes for a triangle and its vertices, without attributes: measured at 90.
+/// What the decoder takes for a triangle and its vertices, with a margin: a scan of a million
+/// triangles takes 56, with its positions.
 constexpr std::uint64_t bytes_per_triangle = 128;
 /// For each set of attributes that has seams of its own.
 constexpr std::uint64_t bytes_per_triangle_of_seams = 48;
 
-/// Real data decode to 200 times their size at most; the first part is for small ones.
+/// That scan, of 0.7 bytes per triangle, takes 76 times its size. The first part is for small data.
 std::uint64_t mostMemory(std::uint64_t encoded_bytes) {
   return (std::uint64_t{128} << 20) + 256 * encoded_bytes;
 }

@@ -21,30 +21,69 @@ constexpr int most_levels = 64;
 constexpr std::uint64_t most_values = std::uint64_t{1} << 21;
 constexpr std::uint64_t most_count = std::uint64_t{1} << 53;
 
+/// Reads the text without keeping it. (A parser with a callback could do both at once, but takes
+/// time in the square of the length of an array.)
+class Checker : public nlohmann::json_sax<json> {
+ public:
+  Checker(const MeshFile& file, std::string_view text) : file_(file), text_(text) {}
+
+  bool null() override { return value(); }
+  bool boolean(bool /*value*/) override { return value(); }
+  bool number_integer(number_integer_t /*value*/) override { return value(); }
+  bool number_unsigned(number_unsigned_t /*value*/) override { return value(); }
+  bool number_float(number_float_t /*value*/, const string_t& /*text*/) override { return value(); }
+  bool string(string_t& /*text*/) override { return value(); }
+  bool binary(binary_t& /*bytes*/) override { return value(); }
+  bool key(string_t& /*text*/) override { return true; }
+  bool start_object(std::size_t /*size*/) override { return enter(); }
+  bool start_array(std::size_t /*size*/) override { return enter(); }
+  bool end_object() override { return leave(); }
+  bool end_array() override { return leave(); }
+
+  bool parse_error(std::size_t position, const std::string& /*token*/,
+                   const json::exception& error) override {
+    const std::size_t at = std::min(std::max<std::size_t>(position, 1) - 1, text_.size());
+    constexpr int number_out_of_range = 406;
+    if (error.id == number_out_of_range)
+      file_.refuseAtByte(text_.data() + at, "here a number is too large; export the file again");
+    file_.refuseAtByte(text_.data() + at,
+                       "here the text is no JSON; export or download the file again");
+  }
+
+ private:
+  bool value() {
+    constexpr std::uint64_t values_per_look = 1 << 16;
+    if (++values_ % values_per_look == 0) throwIfInterrupted();
+    if (values_ > most_values)
+      file_.refuse("its JSON has more than " + std::to_string(most_values) +
+                   " values; split the scene");
+    return true;
+  }
+
+  bool enter() {
+    if (++level_ > most_levels)
+      file_.refuse("its JSON nests deeper than " + std::to_string(most_levels) +
+                   " levels; export it again");
+    return value();
+  }
+
+  bool leave() {
+    --level_;
+    return true;
+  }
+
+  const MeshFile& file_;
+  std::string_view text_;
+  std::uint64_t values_ = 0;
+  int level_ = 0;
+};
+
 }  // namespace
 
 GltfJson::GltfJson(const MeshFile& file, std::string_view text) : file_(file) {
-  std::uint64_t values = 0;
-  const auto check = [&](int depth, json::parse_event_t /*event*/, const json& /*value*/) {
-    constexpr std::uint64_t values_per_look = 1 << 16;
-    if (++values % values_per_look == 0) throwIfInterrupted();
-    if (depth > most_levels)
-      file.refuse("its JSON nests deeper than " + std::to_string(most_levels) +
-                  " levels; export it again");
-    if (values > most_values)
-      file.refuse("its JSON has more than " + std::to_string(most_values) +
-                  " values; split the scene");
-    return true;
-  };
-  try {
-    json_ = std::make_unique<json>(json::parse(text.begin(), text.end(), check));
-  } catch (const json::parse_error& error) {
-    const std::size_t at = std::min(std::max<std::size_t>(error.byte, 1) - 1, text.size());
-    file.refuseAtByte(text.data() + at,
-                      "here the text is no JSON; export or download the file again");
-  } catch (const json::exception&) {
-    file.refuse("its JSON has a number that is too large; export it again");
-  }
+  Checker checker(file, text);
+  json::sax_parse(text.begin(), text.end(), &checker);
+  json_ = std::make_unique<json>(json::parse(text.begin(), text.end()));
 }
 
 GltfJson::~GltfJson() = default;

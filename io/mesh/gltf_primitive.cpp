@@ -218,21 +218,19 @@ void GltfPrimitives::readVertices(const GltfValue& json, const Source& source,
 void GltfPrimitives::readLook(const GltfValue& json, const Source& source,
                               GltfPrimitive& primitive) {
   const std::optional<std::uint64_t> material = optionalIndex(json["material"]);
-  bool with_texture = false;
-  if (const auto texture = materials_.textureOf(material)) {
-    const Values values = source("TEXCOORD_" + std::to_string(texture->set), false);
-    with_texture = values.components == 2;
-    if (with_texture) {
-      readCoordinates(values, texture->transform, primitive);
-    } else {
-      ++omissions_.missing_coordinates;
-    }
-  }
+  const auto texture = materials_.textureOf(material);
+  const std::uint64_t set = texture ? texture->set : 0;
+  const Values coordinates = source("TEXCOORD_" + std::to_string(set), false);
+  const bool has_coordinates = coordinates.components == 2;
+  // Also without a texture: one can be given to the mesh.
+  if (has_coordinates)
+    readCoordinates(coordinates, texture ? texture->transform : GltfTextureTransform{}, primitive);
+  omissions_.missing_coordinates += texture && !has_coordinates ? 1 : 0;
   const Values colours = source("COLOR_0", true);
   if (colours.components == 3 || colours.components == 4)
     readColours(colours, materials_.hasOpacity(material), primitive);
-  primitive.is_plain = !material && primitive.colours.empty();
-  primitive.material = materials_.use(material, with_texture);
+  primitive.is_plain = !material && primitive.colours.empty() && primitive.coordinates.empty();
+  primitive.material = materials_.use(material, has_coordinates && texture);
 }
 
 void GltfPrimitives::readCoordinates(const Values& values, const GltfTextureTransform& transform,

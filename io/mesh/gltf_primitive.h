@@ -24,7 +24,7 @@ struct GltfPrimitive {
   std::vector<openvdb::Vec2f> coordinates;
   std::vector<openvdb::Vec4f> colours;
   std::uint32_t material = 0;
-  bool is_plain = true;  ///< of the default material, without colours
+  bool is_plain = true;  ///< of the default material, without colours and coordinates
 };
 
 /// What was passed over, to be warned of once.

@@ -112,6 +112,16 @@ TEST(Draco, ReadsColoursOfVertices) {
             Vec4f(linear(0.5), 1, 0, 1));
 }
 
+TEST(Draco, ReadsTextureCoordinatesFromTheTop) {
+  const auto mesh = dracoMesh({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}});
+  mesh->AddAttribute(attribute<float>(draco::GeometryAttribute::TEX_COORD, draco::DT_FLOAT32, 2,
+                                      {0, 0, 1, 0.25F, std::nanf(""), 1}));
+  const std::string bytes = encoded(*mesh, draco::MESH_SEQUENTIAL_ENCODING);
+  const Mesh read = parseMesh(MeshFile("part", bytes, {}, MeshColours::read));
+  EXPECT_EQ(read.appearance->coordinates.at(0),
+            (Appearance::Coordinates{openvdb::Vec2f(0, 1), {1, 0.75F}, {0, 0}}));
+}
+
 TEST(Draco, CarriesColoursThroughAFile) {
   const ScratchFolder scratch;
   const Mesh box = boxMesh({0, 0, 0}, {1, 1, 1});

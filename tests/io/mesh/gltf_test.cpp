@@ -256,7 +256,7 @@ TEST(Gltf, ReadsQuantizedPositions) {
   file.json["extensionsRequired"] = {"KHR_mesh_quantization"};
   file.addMesh({{"attributes", {{"POSITION", bytes}}}});
   EXPECT_EQ(parseQuietly(file.text()).vertices,
-            (std::vector<Vec3d>{{-1000, 0, 0}, {0, 1000, 0}, {0, 0, 0}}));
+            (std::vector<Vec3d>{{-1000, 0, 0}, {1000, 0, 0}, {0, 0, 1000}}));
   file.json["accessors"][0].erase("normalized");
   EXPECT_EQ(parseQuietly(file.text()).vertices[0], Vec3d(-128000, 0, 0));
 }
@@ -354,6 +354,15 @@ TEST(Gltf, AMaterialChoosesItsSetOfCoordinatesAndTransformsThem) {
   EXPECT_TRUE(turned[0].eq(Vec2f(0.5F, 0.25F), 1e-6F));
   EXPECT_TRUE(turned[1].eq(Vec2f(0.5F, -1.75F), 1e-6F)) << "scaled, turned from v to u, moved";
   EXPECT_TRUE(turned[2].eq(Vec2f(2.5F, 0.25F), 1e-6F));
+}
+
+TEST(Gltf, CoordinatesAreReadWithoutATexture) {
+  GltfFile file = textured();
+  file.json["meshes"][0]["primitives"][0].erase("material");
+  const Mesh mesh = parseColours(file.text());
+  ASSERT_NE(mesh.appearance, nullptr);
+  EXPECT_EQ(mesh.appearance->coordinates[0][1], Vec2f(1, 0));
+  EXPECT_THAT(mesh.appearance->textures, IsEmpty());
 }
 
 TEST(Gltf, SamplersWrapAndSmooth) {
