@@ -144,12 +144,7 @@ class Description {
   Description(const VdbContents& contents, const std::string& path)
       : schema_(schemaOf(contents, "'" + path + "'")) {
     for (const auto& [name, grid] : contents.grids) summaries_[name] = summaryOf(*grid);
-    layers_ = schema_.lattice.layers().size();
-    if (const auto some = schema_.metadata.extract(layers_key)) {
-      ZRange held;
-      std::istringstream(some.mapped()) >> held.begin >> held.end;
-      layers_ = held.size();
-    }
+    layers_ = takeHeldLayers(schema_, "'" + path + "'").value_or(schema_.lattice.layers()).size();
   }
 
   void add(const Slab& slab) {

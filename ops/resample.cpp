@@ -309,6 +309,7 @@ class Resample : public Source {
       if (isOfNumbers(*grid) && !isToBeCarried(name)) numbers.push_back(name);
       if (isOfVoxels(*grid)) voxels.push_back(name);
     }
+    if (grids.empty()) throw DataError("the file holds no grids; archive it again with one");
     if (grid_name_.empty()) {
       const std::vector<std::string>& likely = numbers.empty() ? voxels : numbers;
       if (grids.contains(surface_grid)) {
@@ -316,7 +317,7 @@ class Resample : public Source {
       } else if (likely.size() == 1) {
         grid_name_ = likely.front();
       } else {
-        throw UsageError("--grid: say which of" + (names.empty() ? " no grids" : names));
+        throw UsageError("--grid: say which of" + names);
       }
     }
     const auto found = grids.find(grid_name_);

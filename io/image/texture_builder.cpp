@@ -54,10 +54,19 @@ std::vector<double> curveOf(const std::optional<double>& exponent, std::size_t c
   return curve;
 }
 
-/// The same; that of sRGB is made once.
-std::vector<double> fineCurveOf(const std::optional<double>& exponent) {
-  static const std::vector<double> srgb = curveOf(std::nullopt, 65536);
-  return exponent ? curveOf(exponent, 65536) : srgb;
+constexpr std::size_t fine_steps = 65536;
+
+/// That of sRGB is made once.
+const std::vector<double>& fineSrgbCurve() {
+  static const std::vector<double> curve = curveOf(std::nullopt, fine_steps);
+  return curve;
+}
+
+/// Up to some texels, they take some hundred MB at most and little time, whatever the file holds.
+bool areTooFewBytes(std::uint64_t texels, std::uint64_t file_bytes) {
+  constexpr std::uint64_t cheap_texels = std::uint64_t{1} << 24;
+  constexpr std::uint64_t most_texels_per_byte = 64;
+  return texels > cheap_texels && texels / most_texels_per_byte > file_bytes;
 }
 
 }  // namespace
@@ -73,7 +82,12 @@ TextureBuilder::TextureBuilder(std::uint32_t width, std::uint32_t height,
   if (transform_ != nullptr || layout.type == SampleLayout::Type::real) return;
   const bool has_other_values = layout.type == SampleLayout::Type::word || layout.colours == 4 ||
                                 layout.opacity == SampleLayout::Opacity::associated;
-  curve_ = has_other_values ? fineCurveOf(space.exponent) : curveOf(space.exponent, 256);
+  if (has_other_values && !space.exponent) {
+    curve_ = fineSrgbCurve();
+  } else {
+    own_curve_ = curveOf(space.exponent, has_other_values ? fine_steps : 256);
+    curve_ = own_curve_;
+  }
   for (std::size_t i = 0; !has_other_values && i < 256; ++i)
     opaque_curve_.push_back(shareOf(curve_[i]));
 }
@@ -144,6 +158,17 @@ void TextureBuilder::convert(const Sample* samples, Texture::Texel* texels) cons
   }
 }
 
+void checkTexturesTogether(std::uint64_t texels, std::uint64_t file_bytes) {
+  if (texels > most_texels) {
+    throw DataError("have more than " + std::to_string(most_texels) +
+                    " pixels together; scale them down");
+  }
+  if (areTooFewBytes(texels, file_bytes)) {
+    throw DataError("have " + std::to_string(texels) + " pixels in " + std::to_string(file_bytes) +
+                    " bytes, too few for pictures; scale them down");
+  }
+}
+
 void checkTextureSize(std::uint64_t width, std::uint64_t height, std::uint64_t pixel_bytes,
                       std::size_t file_bytes) {
   if (width == 0 || height == 0) throw DataError("has no pixels; save it again");
@@ -152,14 +177,11 @@ void checkTextureSize(std::uint64_t width, std::uint64_t height, std::uint64_t p
     throw DataError("has " + size + "; at most " + std::to_string(most_texels) +
                     " are read; scale it down");
   }
-  // Up to here it takes some hundred MB at most, and little time, whatever the file holds.
-  constexpr std::uint64_t cheap_texels = std::uint64_t{1} << 24;
   constexpr std::uint64_t cheap_bytes = std::uint64_t{1} << 28;
-  constexpr std::uint64_t most_texels_per_byte = 64;
   constexpr std::uint64_t most_bytes_per_byte = 256;
   const std::uint64_t texels = width * height;
   const std::uint64_t bytes = texels * pixel_bytes;
-  if ((texels > cheap_texels && texels / most_texels_per_byte > file_bytes) ||
+  if (areTooFewBytes(texels, file_bytes) ||
       (bytes > cheap_bytes && bytes / most_bytes_per_byte > file_bytes)) {
     throw DataError("has " + size + " in " + std::to_string(file_bytes) +
                     " bytes, too few for a picture; scale it down");

@@ -37,6 +37,9 @@ class TextureBuilder {
  public:
   TextureBuilder(std::uint32_t width, std::uint32_t height, const SampleLayout& layout,
                  const ColourSpace& space, TextureOpacity opacity);
+  TextureBuilder(const TextureBuilder&) = delete;
+  TextureBuilder& operator=(const TextureBuilder&) = delete;
+  ~TextureBuilder() = default;
 
   /// @param samples  `width` pixels, aligned for their type. Throws Interrupted.
   void row(const std::uint8_t* samples);
@@ -55,7 +58,8 @@ class TextureBuilder {
   SampleLayout layout_;
   TextureOpacity opacity_;
   std::unique_ptr<ColourTransform> transform_;
-  std::vector<double> curve_;                ///< linear light by sample; empty for reals
+  std::vector<double> own_curve_;
+  std::span<const double> curve_;            ///< linear light by sample; empty for reals
   std::vector<std::uint16_t> opaque_curve_;  ///< the same of bytes, as opaque texels hold it
   Texture texture_;
 };

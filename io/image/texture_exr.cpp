@@ -83,7 +83,7 @@ struct ExrSize {
 
 /// Checks what the header makes OpenEXR allocate.
 ExrSize checkedExrSize(const Imf::Header& header, std::size_t file_bytes) {
-  const Imath::Box2i window = header.dataWindow();
+  const Imath::Box2i& window = header.dataWindow();
   const auto extent = [](int low, int high) {
     return static_cast<std::uint64_t>(std::int64_t{high} - low + 1);
   };
@@ -170,7 +170,7 @@ Texture readExrTexture(Bytes bytes, TextureOpacity opacity) {
 
   source.seekg(0);
   Imf::InputFile file(source, 0);
-  const Imath::Box2i window = file.header().dataWindow();
+  const Imath::Box2i& window = file.header().dataWindow();
   if (window != header.dataWindow()) throw DataError("is no readable EXR: it is damaged");
   std::vector<float> row(size.width * names.size());
   Imf::FrameBuffer buffer;

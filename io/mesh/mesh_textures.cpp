@@ -9,15 +9,17 @@ namespace vdbdither {
 std::uint32_t MeshTextures::indexOf(std::string_view path) {
   if (const auto known = indices_.find(path); known != indices_.end()) return known->second;
   const SideFile image = readSideFile(file_, "texture", path, most_texture_bytes);
+  file_bytes_ += image.bytes.size();
   try {
     textures_.push_back(decodeTexture(image.text(), image.shown));
   } catch (const DataError& error) {
     file_.refuse(error.what());
   }
   texels_ += textures_.back().texels.size();
-  if (texels_ > most_texels) {
-    file_.refuse("its textures have more than " + std::to_string(most_texels) +
-                 " pixels together; scale them down");
+  try {
+    checkTexturesTogether(texels_, file_bytes_);
+  } catch (const DataError& error) {
+    file_.refuse(std::string("its textures ") + error.what());
   }
   const auto index = static_cast<std::uint32_t>(textures_.size() - 1);
   indices_.emplace(path, index);

@@ -16,8 +16,8 @@ class MeshTextures {
  public:
   explicit MeshTextures(const MeshFile& file) : file_(file) {}
 
-  /// Returns the index of a texture. Refuses what cannot be read, and textures that have more than
-  /// `most_texels` together.
+  /// Returns the index of a texture. Refuses what cannot be read, and textures that are too
+  /// large together (`checkTexturesTogether`).
   /// @param path  as `readSideFile` takes it
   std::uint32_t indexOf(std::string_view path);
 
@@ -27,6 +27,7 @@ class MeshTextures {
   const MeshFile& file_;
   std::map<std::string, std::uint32_t, std::less<>> indices_;
   std::uint64_t texels_ = 0;
+  std::uint64_t file_bytes_ = 0;
   std::vector<Texture> textures_;
 };
 

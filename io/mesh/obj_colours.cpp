@@ -17,8 +17,6 @@ using openvdb::Vec4f;
 
 namespace {
 
-/// A library has some hundred bytes a material.
-constexpr std::uint64_t most_library_bytes = std::uint64_t{1} << 26;
 constexpr std::size_t triangles_per_look = 1 << 16;
 
 float finiteOrZero(double value) {
@@ -105,31 +103,44 @@ bool ObjColours::hasCoordinates(std::size_t triangle, const std::string& texture
   return true;
 }
 
-/// The rest of a line is one name, which may have blanks, or several.
 void ObjColours::readLibraries() {
-  std::map<std::string_view, bool> done;
-  for (const std::string_view line : libraries_) {
-    const std::string_view whole = mtlName(line);
-    if (whole.empty() || !done.emplace(whole, true).second) continue;
-    if (hasSideFile(file_, whole)) {
-      readLibrary(whole);
-      continue;
-    }
-    TextCursor text(whole);
-    for (auto word = text.word(); !word.empty(); word = text.word()) {
-      if (word != whole && !done.emplace(word, true).second) continue;
-      if (hasSideFile(file_, word)) {
-        readLibrary(word);
-      } else {
-        file_.warn("the material library " + inQuotes(word) +
-                   " is not in the folder of the mesh; its materials are white");
-      }
+  std::set<std::string_view> named;
+  for (const std::string_view line : libraries_) readNamedLibraries(mtlName(line), named);
+  if (missing_libraries_ == 1) {
+    file_.warn("the material library " + inQuotes(first_missing_library_) +
+               " is not in the folder of the mesh; its materials are white");
+  } else if (missing_libraries_ > 0) {
+    file_.warn(std::to_string(missing_libraries_) + " material libraries, the first " +
+               inQuotes(first_missing_library_) +
+               ", are not in the folder of the mesh; their materials are white");
+  }
+}
+
+/// The rest of a line is one name, which may have blanks, or several.
+void ObjColours::readNamedLibraries(std::string_view line, std::set<std::string_view>& named) {
+  constexpr std::size_t most_libraries = 1000;
+  const auto isNew = [&](std::string_view name) {
+    if (!named.insert(name).second) return false;
+    if (named.size() > most_libraries)
+      file_.refuse("it names more than 1000 material libraries; export it again");
+    return true;
+  };
+  if (line.empty() || !isNew(line)) return;
+  if (hasSideFile(file_, line)) return readLibrary(line);
+  TextCursor text(line);
+  for (auto word = text.word(); !word.empty(); word = text.word()) {
+    if (word != line && !isNew(word)) continue;
+    if (word != line && hasSideFile(file_, word)) {
+      readLibrary(word);
+    } else if (missing_libraries_++ == 0) {
+      first_missing_library_ = word;
     }
   }
 }
 
 void ObjColours::readLibrary(std::string_view path) {
-  const SideFile library = readSideFile(file_, "material library", path, most_library_bytes);
+  const SideFile library = readSideFile(file_, "material library", path, library_bytes_left_);
+  library_bytes_left_ -= library.bytes.size();
   const std::size_t slash = path.find_last_of("/\\");
   const std::string folder(path.substr(0, slash == path.npos ? 0 : slash + 1));
   for (MtlMaterial& material : parseMtl(file_, library.text(), library.shown)) {

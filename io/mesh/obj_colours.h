@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -63,6 +64,7 @@ class ObjColours {
   [[nodiscard]] bool hasCoordinates(std::size_t triangle, const std::string& texture) const;
   void readLibraries();
   void readLibrary(std::string_view path);
+  void readNamedLibraries(std::string_view line, std::set<std::string_view>& named);
   std::uint32_t variant(std::uint32_t material, Source source, Appearance& appearance);
   [[nodiscard]] Appearance::Coordinates placed(std::size_t triangle,
                                                const MtlMaterial& material) const;
@@ -70,7 +72,10 @@ class ObjColours {
 
   const MeshFile& file_;
   MeshTextures textures_;
-  std::vector<std::string_view> libraries_;
+  std::vector<std::string_view> libraries_;  ///< lines
+  std::size_t missing_libraries_ = 0;
+  std::string first_missing_library_;
+  std::uint64_t library_bytes_left_ = std::uint64_t{1} << 26;  ///< some hundred are a material
   std::map<std::string_view, std::uint32_t> material_indices_;
   std::vector<std::string_view> material_names_;  ///< in the order of their first use
   std::map<std::string, MtlMaterial, std::less<>> defined_;

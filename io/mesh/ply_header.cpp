@@ -116,8 +116,11 @@ class HeaderParser {
     const std::string_view count = text_.word();
     const char* end = count.data() + count.size();
     const auto [stop, error] = std::from_chars(count.data(), end, element.count);
-    if (count.empty() || error != std::errc() || stop != end) {
+    if (count.empty())
       refuse("element " + inQuotes(element.name) + " has no count; export it again");
+    if (error != std::errc() || stop != end) {
+      refuse("element " + inQuotes(element.name) + " has the count " + inQuotes(count) +
+             ", which must be a whole number from 0 on; export it again");
     }
     for (const PlyElement& other : header_.elements) {
       if (other.name == element.name) {

@@ -2,7 +2,10 @@
 
 #include <cmath>
 #include <cstddef>
+#include <set>
 #include <span>
+#include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -38,6 +41,40 @@ std::string digestOf(const ordered_json& json) {
   return hexText(digest.finish());
 }
 
+/// Looks for a key that an object has twice: programs disagree about which value counts.
+class RepeatedKey : public nlohmann::json_sax<ordered_json> {
+ public:
+  std::string found{};  ///< empty if there is none
+
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool start_array(std::size_t) override { return true; }
+  bool end_array() override { return true; }
+  bool start_object(std::size_t) override {
+    open_.emplace_back();
+    return true;
+  }
+  bool end_object() override {
+    open_.pop_back();
+    return true;
+  }
+  bool key(string_t& key) override {
+    if (!open_.back().insert(key).second) found = key;
+    return found.empty();
+  }
+  bool parse_error(std::size_t, const std::string&, const ordered_json::exception&) override {
+    return false;  // the parser says what is wrong
+  }
+
+ private:
+  std::vector<std::set<std::string>> open_;  ///< the keys of each object that is not at its end
+};
+
 /// Parses a manifest, which may come from anywhere: what takes memory or time out of proportion is
 /// refused.
 class ManifestParser {
@@ -46,6 +83,10 @@ class ManifestParser {
     const std::vector<std::uint8_t> bytes = stack.read(stack.manifestName(), most_bytes);
     checkShape(bytes);
     try {
+      RepeatedKey repeated;
+      ordered_json::sax_parse(bytes.begin(), bytes.end(), &repeated);
+      if (!repeated.found.empty())
+        refuse("it has the key '" + printable(shortened(repeated.found, 60)) + "' twice");
       json_ = ordered_json::parse(bytes.begin(), bytes.end());
     } catch (const ordered_json::parse_error& error) {
       refuse("it is not JSON from byte " + std::to_string(error.byte) + " on");

@@ -69,7 +69,9 @@ void keep(const fs::path& path, const FloatGrid::ConstPtr& mask) {
 
 std::optional<fs::path> maskCacheFolder() {
   if (const auto cache = folderOf("XDG_CACHE_HOME")) return *cache / "vdbdither" / "masks";
-  if (const auto home = folderOf("HOME")) return *home / ".cache" / "vdbdither" / "masks";
+  std::error_code none;
+  if (const auto home = folderOf("HOME"); home && fs::is_directory(*home, none))
+    return *home / ".cache" / "vdbdither" / "masks";
   return std::nullopt;
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <limits>
-#include <sstream>
 #include <unistd.h>
 
 #include "io/vdb/grid_checks.h"
@@ -84,9 +83,7 @@ void SlabReader::openFile(const std::vector<std::string>& names) {
   schema_ = schemaOf(contents, shown_);
   // A file without that metadata holds all layers, even beyond its box.
   ZRange held{std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};
-  if (const auto some = schema_.metadata.extract(layers_key)) {
-    std::istringstream(some.mapped()) >> held.begin >> held.end;
-  }
+  if (const auto some = takeHeldLayers(schema_, shown_)) held = *some;
   Footprint& footprint = schema_.footprint;
   for (const auto& [z, leaves] : leavesOfRows(contents.grids)) {
     footprint.total += leaves;

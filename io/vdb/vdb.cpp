@@ -21,6 +21,7 @@
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -390,6 +391,19 @@ VdbContents contentsOf(const Schema& schema, Grids grids) {
   contents.metadata[box_key] = boxText(schema.lattice.box);
   contents.metadata[creator_key] = "vdbdither";
   return contents;
+}
+
+std::optional<ZRange> takeHeldLayers(Schema& schema, const std::string& where) {
+  const auto stated = schema.metadata.extract(layers_key);
+  if (!stated) return std::nullopt;
+  ZRange held;
+  std::istringstream text(stated.mapped());
+  if (!(text >> held.begin >> held.end) || held.end < held.begin)
+    throw DataError(
+        where + ": its metadata " + layers_key + " is '" +
+        printable(shortened(stated.mapped(), 60)) +
+        "'; it must be two whole numbers, the first layer and the end; archive it again");
+  return held;
 }
 
 }  // namespace vdbdither

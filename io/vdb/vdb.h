@@ -68,6 +68,10 @@ std::optional<Lattice> latticeOf(const openvdb::GridBase& grid);
 /// transform of a grid is not a scaling, or if grids disagree.
 Schema schemaOf(const VdbContents& contents, const std::string& where);
 
+/// Removes from `schema` the metadata that says which layers of its job a file holds, and returns
+/// the layers, or nothing where the file holds all of them. Throws DataError if it is no range.
+std::optional<ZRange> takeHeldLayers(Schema& schema, const std::string& where);
+
 /// Contents that carry `schema`: its metadata, the lattice's box, and the tool's name as `creator`.
 VdbContents contentsOf(const Schema& schema, Grids grids);
 

@@ -96,7 +96,12 @@ class Masks(ProgramTest):
         self.assertFalse((self.folder / "relative").exists())
 
     def test_without_a_cache_folder_the_home_folder_has_one(self):
-        self.dithered("--size", 8, cache="relative", HOME=str(self.folder / "home"))
+        home = self.folder / "home"
+        self.dithered("--size", 8, cache="relative", HOME=str(home),
+                      warning="made anew in every run: neither XDG_CACHE_HOME nor HOME names a folder")
+        self.assertFalse(home.exists())
+        home.mkdir()
+        self.dithered("--size", 8, cache="relative", HOME=str(home))
         self.assertEqual(len(list((self.folder / "home/.cache/vdbdither/masks").iterdir())), 1)
 
     def test_an_interrupted_run_leaves_no_mask(self):

@@ -129,6 +129,12 @@ class Stacks(ProgramTest):
                 shutil.rmtree(self.out)
                 shutil.copytree(self.made / "out", self.out)
 
+    def test_a_key_that_a_manifest_has_twice_is_refused(self):
+        path = self.out / "manifest.json"
+        path.write_text(path.read_text().replace('"flip_x"', '"pitch_mm": [1, 1, 1], "flip_x"', 1))
+        self.refuse_import("it has the key 'pitch_mm' twice", "out")
+        self.refuse_import("it has the key 'pitch_mm' twice", "out", "--edited")
+
     def test_a_missing_slice_or_two_of_a_layer_are_refused_in_any_case(self):
         self.edit(lambda m: m["slices"][1].update(layer=m["slices"][0]["layer"]))
         self.refuse_import("names two slices of layer ", "out", "--edited")

@@ -1,6 +1,5 @@
 // Feeds the decoders of textures with whatever a fuzzer can think of: they return as many texels as
-// they say or refuse in one line. Build with VDBDITHER_FUZZ=ON by clang, then run it on a folder of
-// small images.
+// they say or refuse in one line. The preset asan builds it; run it on a folder of small images.
 
 #include <cstddef>
 #include <cstdint>

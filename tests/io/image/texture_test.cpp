@@ -64,6 +64,17 @@ TEST(Texture, NamesTheKindsThatAreNotRead) {
   }
 }
 
+TEST(Texture, LimitsTheTexturesOfAMesh) {
+  EXPECT_NO_THROW(checkTexturesTogether(1 << 24, 100));
+  EXPECT_NO_THROW(checkTexturesTogether(1 << 26, 1 << 20));
+  EXPECT_THAT([] { checkTexturesTogether(1 << 26, 1000); },
+              ThrowsMessage<DataError>("have 67108864 pixels in 1000 bytes, too few for pictures; "
+                                       "scale them down"));
+  EXPECT_THAT(
+      [] { checkTexturesTogether(most_texels + 1, most_texels); },
+      ThrowsMessage<DataError>("have more than 268435456 pixels together; scale them down"));
+}
+
 TEST(Texture, RefusesWhatIsNoImage) {
   EXPECT_THAT([] { decodeTexture("", "texture 'a'"); },
               ThrowsMessage<DataError>("texture 'a' is empty; save it again"));

@@ -192,6 +192,19 @@ TEST_F(ObjColoursTest, AMissingLibraryIsToldAndWhite) {
               testing::SizeIs(1));
 }
 
+TEST_F(ObjColoursTest, LimitsTheNumberOfLibraries) {
+  std::string many = "mtllib";
+  for (int i = 0; i < 900; ++i) many += " a" + std::to_string(i);
+  const std::string face = "\n" + triangle + "usemtl a\nf 1 2 3\n";
+  read(many + face);
+  EXPECT_THAT(warnings_,
+              ElementsAre(HasSubstr("900 material libraries, the first 'a0', are not in "
+                                    "the folder of the mesh; their materials are white")));
+  for (int i = 900; i < 1100; ++i) many += " a" + std::to_string(i);
+  EXPECT_THAT(refused(many + face),
+              HasSubstr("it names more than 1000 material libraries; export it again"));
+}
+
 TEST_F(ObjColoursTest, AMissingMaterialIsToldAndWhite) {
   writeLibrary("newmtl a\nKd 1 0 0\n");
   const Mesh mesh = read("mtllib part.mtl\n" + triangle + "usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n");

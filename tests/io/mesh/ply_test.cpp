@@ -202,8 +202,12 @@ TEST(Ply, RefusesABadHeader) {
             "'binary_big_endian 1.0'; export it again");
   EXPECT_EQ(refusal("ply\nend_header\n"),
             "'part', line 2: the header has no 'format'; export it again");
-  EXPECT_EQ(refused("element vertex -1\n"),
+  EXPECT_EQ(refused("element vertex\n"),
             "'part', line 3: element 'vertex' has no count; export it again");
+  for (const std::string count : {"-1", "100000000000000000000", "many"})
+    EXPECT_EQ(refused("element vertex " + count + "\n"),
+              "'part', line 3: element 'vertex' has the count '" + count +
+                  "', which must be a whole number from 0 on; export it again");
   EXPECT_EQ(refused("element vertex 1\nelement vertex 2\n"),
             "'part', line 4: element 'vertex' is declared twice; export it again");
   EXPECT_EQ(refused("property int x\n"),
