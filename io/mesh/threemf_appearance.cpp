@@ -153,9 +153,12 @@ std::uint32_t ThreemfAppearance::textureOf(const ThreemfTexture& texture) {
   appearance_.textures.push_back(decodeTexture(
       {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, package_.shown(member)));
   texels_ += appearance_.textures.back().texels.size();
-  if (texels_ > most_texels)
-    file_.refuse("its textures have more than " + std::to_string(most_texels) +
-                 " texels; make them smaller");
+  texture_bytes_ += bytes.size();
+  try {
+    checkTexturesTogether(texels_, texture_bytes_);
+  } catch (const DataError& error) {
+    file_.refuse(std::string("its textures ") + error.what());
+  }
   return place->second;
 }
 

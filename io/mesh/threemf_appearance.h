@@ -49,7 +49,8 @@ class ThreemfAppearance {
   std::set<std::string>& unread_;
   Appearance appearance_;
   std::uint64_t triangles_ = 0;
-  std::uint64_t texels_ = 0;
+  std::uint64_t texels_ = 0;         ///< of all textures
+  std::uint64_t texture_bytes_ = 0;  ///< of their files
   std::map<std::pair<Key, std::uint32_t>, std::uint32_t> material_of_base_;
   std::map<Key, std::uint32_t> material_of_texture_;
   std::map<std::string, std::uint32_t> texture_of_member_;
