@@ -20,6 +20,7 @@ using openvdb::Vec2f;
 using openvdb::Vec3d;
 using openvdb::Vec4f;
 using testing::ElementsAre;
+using testing::SizeIs;
 using Json = GltfFile::Json;
 
 std::string dracoSquare() {
