@@ -1,4 +1,3 @@
-#include <cmath>
 #include <cstdint>
 #include <draco/compression/encode.h>
 #include <draco/mesh/mesh.h>
@@ -16,7 +15,6 @@
 namespace vdbdither::test {
 namespace {
 
-using openvdb::Vec2f;
 using openvdb::Vec3d;
 using openvdb::Vec4f;
 using testing::ElementsAre;
