@@ -1,5 +1,5 @@
 // Feeds the mesh parsers with whatever a fuzzer can think of: they return a sound mesh or refuse in
-// one line. The preset asan builds it; run it on a folder of small meshes.
+// one line. The preset fuzz builds it; run it on a folder of small meshes.
 
 #include <cmath>
 #include <cstddef>

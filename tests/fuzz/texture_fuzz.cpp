@@ -1,5 +1,5 @@
 // Feeds the decoders of textures with whatever a fuzzer can think of: they return as many texels as
-// they say or refuse in one line. The preset asan builds it; run it on a folder of small images.
+// they say or refuse in one line. The preset fuzz builds it; run it on a folder of small images.
 
 #include <cstddef>
 #include <cstdint>

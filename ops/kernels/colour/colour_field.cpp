@@ -41,10 +41,10 @@ struct LayerGroups {
 
 int layersWithin(const Vec3d& pitch_mm) {
   const double longest_mm = std::max({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()});
-  constexpr int most = 15;
+  constexpr double most_beside = 7;
   constexpr double rounding = 1e-9;
-  const auto beside = static_cast<int>(
-      std::min(0.5 * longest_mm / pitch_mm.z() + rounding, static_cast<double>(most / 2)));
+  const auto beside =
+      static_cast<int>(std::min(0.5 * longest_mm / pitch_mm.z() + rounding, most_beside));
   return 2 * beside + 1;
 }
 

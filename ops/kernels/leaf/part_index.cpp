@@ -85,6 +85,7 @@ openvdb::Int32Grid::Ptr partIndex(std::span<const FloatGrid::ConstPtr> given, Pa
   parts.getNodes(leaves);
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
     std::vector<Accessor> accessors;
+    accessors.reserve(surfaces.size());
     for (const FloatGrid::ConstPtr& surface : surfaces) accessors.emplace_back(surface->tree());
     fillLeaf(*leaves[i], numbers, accessors);
   });
