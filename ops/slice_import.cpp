@@ -445,7 +445,7 @@ class SliceImport : public Source {
 
 extern const OperatorInfo slice_import;
 const OperatorInfo slice_import{
-    "slice-import", "The voxels of a stack that slice-export made",
+    "slice-import", "The voxels of a stack of slices, of slice-export or another program",
     "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! slice-export out\n"
     "slice-import out -o again.vdb",
     []() -> std::unique_ptr<Operator> { return std::make_unique<SliceImport>(); }};

@@ -3,7 +3,6 @@
 import json
 import os
 import resource
-import subprocess
 import unittest
 import zipfile
 
@@ -11,7 +10,7 @@ import meshes
 import numpy
 import pyopenvdb
 from PIL import Image
-from program import MIMAKI, PATIENCE, PROGRAM, ProgramTest
+from program import MIMAKI, PATIENCE, ProgramTest
 
 SECONDS = 20
 BYTES = 2 << 30
@@ -79,10 +78,6 @@ class ImageStacks(ProgramTest):
         exact = {grid.name: grid for grid in pyopenvdb.readAll(str(self.folder / "exact.vdb"))[0]}
         low = manifest["box"]["min"]
 
-        def moved(grid, meaning):
-            return {(x - low[0], y - low[1], z - manifest["first_layer"] - low[2] + low[2]): meaning(value)
-                    for (x, y, z), value in self.voxels(grid).items()}
-
         bottom = min(z for _, _, z in self.voxels(exact["solid"]))
         for stack in ("stack", "bits"):
             (self.folder / stack / "manifest.json").unlink()
@@ -99,7 +94,7 @@ class ImageStacks(ProgramTest):
         self.draw("a2.png", [[CLEAR, CLEAR, CLEAR], [RED, CLEAR, CLEAR]])
         grids = self.imported()
         self.assertEqual(set(grids), {"solid", "Cd", "Alpha"})
-        self.assertEqual(grids["Cd"].vectorTypeName if hasattr(grids["Cd"], "vectorTypeName") else grids["Cd"].metadata["vector_type"], "invariant")
+        self.assertEqual(grids["Cd"].metadata["vector_type"], "invariant")
         colours = self.voxels(grids["Cd"])
         self.assertEqual(set(colours), {(0, 1, 0), (2, 1, 0), (2, 0, 0), (0, 0, 1)})
         self.assertEqual(set(self.voxels(grids["solid"])), set(colours))
