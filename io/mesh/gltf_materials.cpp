@@ -45,14 +45,6 @@ GltfTextureTransform transformOf(const GltfValue& json) {
           {-sine * scale_u, cosine * scale_v, numberIn(offset, 1, 0)}};
 }
 
-Texture decoded(const MeshFile& file, const GltfBytes& source, TextureOpacity opacity) {
-  try {
-    return decodeTexture(source.bytes, source.shown, opacity);
-  } catch (const DataError& error) {
-    file.refuse(error.what());
-  }
-}
-
 }  // namespace
 
 GltfValue GltfMaterials::json(std::optional<std::uint64_t> material) const {
@@ -140,14 +132,7 @@ std::uint32_t GltfMaterials::decode(std::uint64_t image, TextureOpacity opacity)
       json.has("bufferView")
           ? GltfBytes{buffers_.view(json["bufferView"].count()).bytes, "texture " + json.path()}
           : buffers_.resource("texture", json["uri"], most_texture_bytes);
-  vdbdither::Texture texture = decoded(file_, source, opacity);
-  texels_ += texture.texels.size();
-  if (texels_ > most_texels)
-    file_.refuse("its textures have more than " + std::to_string(most_texels) +
-                 " texels together; make them smaller");
-  const auto index = static_cast<std::uint32_t>(textures_.size());
-  textures_.push_back(std::move(texture));
-  return decoded_[{image, opacity}] = index;
+  return decoded_[{image, opacity}] = textures_.add(source.bytes, source.shown, opacity);
 }
 
 }  // namespace vdbdither

@@ -13,6 +13,7 @@
 #include "io/image/texture.h"
 #include "io/mesh/gltf_buffers.h"
 #include "io/mesh/gltf_json.h"
+#include "io/mesh/mesh_textures.h"
 #include "vdbdither/model/appearance.h"
 
 namespace vdbdither {
@@ -39,7 +40,7 @@ class GltfMaterials {
   };
 
   GltfMaterials(const MeshFile& file, const GltfValue& root, GltfBuffers& buffers)
-      : file_(file), root_(root), buffers_(buffers) {}
+      : file_(file), root_(root), buffers_(buffers), textures_(file) {}
 
   /// What a primitive needs to show the texture of its material; nothing if it has none.
   [[nodiscard]] std::optional<Texture> textureOf(std::optional<std::uint64_t> material) const;
@@ -53,7 +54,7 @@ class GltfMaterials {
 
   /// What was used, for an Appearance. To be called at the end.
   std::vector<SurfaceMaterial> takeMaterials() { return std::move(materials_); }
-  std::vector<vdbdither::Texture> takeTextures() { return std::move(textures_); }
+  std::vector<vdbdither::Texture> takeTextures() { return textures_.take(); }
 
  private:
   struct Base {
@@ -72,10 +73,9 @@ class GltfMaterials {
   GltfValue root_;
   GltfBuffers& buffers_;
   std::vector<SurfaceMaterial> materials_;
-  std::vector<vdbdither::Texture> textures_;
+  MeshTextures textures_;
   std::map<std::pair<std::optional<std::uint64_t>, bool>, std::uint32_t> used_;
   std::map<std::pair<std::uint64_t, TextureOpacity>, std::uint32_t> decoded_;
-  std::uint64_t texels_ = 0;
 };
 
 }  // namespace vdbdither

@@ -6,18 +6,24 @@
 #include <string_view>
 #include <vector>
 
+#include "io/image/texture.h"
 #include "io/mesh/mesh_file.h"
 #include "vdbdither/model/appearance.h"
 
 namespace vdbdither {
 
-/// Reads the textures that a mesh file names, each once.
+/// The textures of a mesh file. Refuses, in its name, what cannot be decoded, and textures that are
+/// too large together (`checkTexturesTogether`).
 class MeshTextures {
  public:
   explicit MeshTextures(const MeshFile& file) : file_(file) {}
 
-  /// Returns the index of a texture. Refuses what cannot be read, and textures that are too
-  /// large together (`checkTexturesTogether`).
+  /// Decodes a texture and returns its index.
+  /// @param bytes, shown, opacity  see `decodeTexture`
+  std::uint32_t add(std::string_view bytes, const std::string& shown,
+                    TextureOpacity opacity = TextureOpacity::keep);
+
+  /// Returns the index of the texture in a file beside the mesh, which is read once.
   /// @param path  as `readSideFile` takes it
   std::uint32_t indexOf(std::string_view path);
 

@@ -146,20 +146,11 @@ std::uint32_t ThreemfAppearance::textureMaterial(const ThreemfPart& part,
 
 std::uint32_t ThreemfAppearance::textureOf(const ThreemfTexture& texture) {
   const std::string member = package_.find("texture", texture.path);
-  const auto [place, is_new] = texture_of_member_.try_emplace(
-      member, static_cast<std::uint32_t>(appearance_.textures.size()));
+  const auto [place, is_new] = texture_of_member_.try_emplace(member, 0);
   if (!is_new) return place->second;
   const auto bytes = package_.read(member, most_texture_bytes);
-  appearance_.textures.push_back(decodeTexture(
-      {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, package_.shown(member)));
-  texels_ += appearance_.textures.back().texels.size();
-  texture_bytes_ += bytes.size();
-  try {
-    checkTexturesTogether(texels_, texture_bytes_);
-  } catch (const DataError& error) {
-    file_.refuse(std::string("its textures ") + error.what());
-  }
-  return place->second;
+  return place->second = textures_.add({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
+                                       package_.shown(member));
 }
 
 std::uint32_t ThreemfAppearance::addMaterial(SurfaceMaterial material) {
@@ -181,6 +172,7 @@ std::shared_ptr<const Appearance> ThreemfAppearance::take() {
   appearance_.material.resize(triangles_, 0);
   if (!appearance_.coordinates.empty()) appearance_.coordinates.resize(triangles_, noCoordinates());
   if (!appearance_.colours.empty()) appearance_.colours.resize(triangles_, whiteCorners());
+  appearance_.textures = textures_.take();
   return std::make_shared<const Appearance>(std::move(appearance_));
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "io/mesh/mesh_file.h"
+#include "io/mesh/mesh_textures.h"
 #include "io/mesh/threemf_model.h"
 #include "io/mesh/threemf_package.h"
 
@@ -19,7 +20,7 @@ class ThreemfAppearance {
   /// All parameters must outlive the object.
   /// @param unread  gets the kinds of properties that are passed over
   ThreemfAppearance(const MeshFile& file, ThreemfPackage& package, std::set<std::string>& unread)
-      : file_(file), package_(package), unread_(unread) {}
+      : file_(file), package_(package), unread_(unread), textures_(file) {}
 
   /// Adds the triangles of an object behind those that came before.
   /// @param is_turned  whether the second and third corner of each triangle are swapped
@@ -49,8 +50,7 @@ class ThreemfAppearance {
   std::set<std::string>& unread_;
   Appearance appearance_;
   std::uint64_t triangles_ = 0;
-  std::uint64_t texels_ = 0;         ///< of all textures
-  std::uint64_t texture_bytes_ = 0;  ///< of their files
+  MeshTextures textures_;
   std::map<std::pair<Key, std::uint32_t>, std::uint32_t> material_of_base_;
   std::map<Key, std::uint32_t> material_of_texture_;
   std::map<std::string, std::uint32_t> texture_of_member_;

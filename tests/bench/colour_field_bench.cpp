@@ -2,6 +2,7 @@
 // colour_field_bench [--benchmark_…] SIZE_MM DEPTH_MM mesh [texture]
 
 #include <cstdlib>
+#include <malloc.h>
 #include <memory>
 #include <string>
 #include <vector>
@@ -79,6 +80,7 @@ void run(benchmark::State& state, const Part& part, double depth_mm, bool with_c
 }  // namespace
 
 int main(int argc, char** argv) {
+  mallopt(M_TRIM_THRESHOLD, 256 << 20);
   openvdb::initialize();
   benchmark::Initialize(&argc, argv);
   if (argc < 4) return EXIT_FAILURE;

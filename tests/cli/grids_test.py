@@ -132,10 +132,10 @@ class HeldLayers(ProgramTest):
         meshes.write_stl(self.folder / "part.stl", meshes.box((0.6, 0.7, 0.4)))
         self.succeed("mesh2sdf", "part.stl", *MIMAKI, "--layers", "0:8", "!", "write", "some.vdb", "--codec", "none")
         stated = sized(b"vdbdither:layers") + sized(b"string")
-        content = patched((self.folder / "some.vdb").read_bytes(), (stated + sized(b"0 8"), stated + sized(b"8 0")))
+        content = patched((self.folder / "some.vdb").read_bytes(), (stated + sized(b"-5 3"), stated + sized(b"3 -5")))
         (self.folder / "bad.vdb").write_bytes(content)
         for chain in (("info", "bad.vdb"), ("read", "bad.vdb", "!", "stats")):
-            self.refuse(1, "its metadata vdbdither:layers is '8 0'; it must be two whole numbers", *chain)
+            self.refuse(1, "its metadata vdbdither:layers is '3 -5'; it must be two whole numbers", *chain)
 
     def test_resample_refuses_a_file_without_grids(self):
         self.folder.joinpath("none.vdb").write_bytes(HEADER + struct.pack("<II", 0, 0))

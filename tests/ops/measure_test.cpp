@@ -160,9 +160,9 @@ TEST_F(Measure, RefusesWhatCannotBeMeasured) {
               ThrowsMessage<UsageError>("'--reference' is missing; see --help"));
   EXPECT_THAT(plan({file("part.stl"), "--reference", file("none.stl")}),
               ThrowsMessage<DataError>(HasSubstr("no such file")));
-  EXPECT_THAT(
-      plan({file("part.stl"), "--reference", file("part.stl"), "--map", "map.stl"}),
-      ThrowsMessage<UsageError>(HasSubstr("--map: 'map.stl' cannot hold colours; name a .ply")));
+  EXPECT_THAT(plan({file("part.stl"), "--reference", file("part.stl"), "--map", "map.stl"}),
+              ThrowsMessage<UsageError>(HasSubstr(
+                  "--map: 'map.stl' cannot hold colours; name a .drc, .glb or .ply file")));
   for (const char* spacing : {"0", "1e-5mm", "2m"}) {
     EXPECT_THAT(plan({file("part.stl"), "--reference", file("part.stl"), "--spacing", spacing}),
                 ThrowsMessage<UsageError>("--spacing: '" + std::string(spacing) +

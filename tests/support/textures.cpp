@@ -66,6 +66,7 @@ Bytes pngOf(const Samples& samples, bool is_interlaced, const PngColours& colour
   if (samples.bits == 16) png_set_swap(png);
   Bytes packed = samples.packed();
   std::vector<png_bytep> rows;
+  rows.reserve(samples.height);
   for (std::size_t y = 0; y < samples.height; ++y)
     rows.push_back(packed.data() + y * (packed.size() / samples.height));
   png_write_image(png, rows.data());

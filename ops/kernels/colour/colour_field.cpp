@@ -116,6 +116,8 @@ class ColourField::Painter::LeafPainter {
         colours_(colours),
         opacities_(opacities),
         nearest_(painter.bands_.size()) {
+    for (int z = 0; z < edge; ++z)
+      group_[static_cast<std::size_t>(z)] = painter.groups_.of(origin_.z() + z);
     std::fill_n(colours.buffer().data(), Vec3SLeaf::SIZE, openvdb::Vec3s(0, 0, 0));
     if (opacities != nullptr) std::fill_n(opacities->buffer().data(), FloatLeaf::SIZE, 0.0F);
   }
@@ -125,27 +127,43 @@ class ColourField::Painter::LeafPainter {
     const FloatLeaf* distances = surface.probeConstLeaf(origin_);
     const float tile_mm = distances != nullptr ? 0 : surface.getValue(origin_);
     const auto outside_mm = static_cast<float>(all_.field_.lattice_.diagonalMm());
-    for (openvdb::Index v = 0; v < Int32Leaf::SIZE; ++v) {
-      const Coord at = Int32Leaf::offsetToLocalCoord(v);
-      if (!all_.core_.contains(origin_.z() + at.z())) continue;
-      const float distance_mm = distances != nullptr ? distances->getValue(v) : tile_mm;
-      if (distance_mm > outside_mm) continue;
-      if (const auto found = find(v, at, distance_mm)) set(v, colourOf(*found, origin_ + at));
+    const auto depth_mm = static_cast<float>(all_.field_.depth_mm_);
+    const Nearest& whole = nearestOf(0);
+    const ZRange layers =
+        intersection({0, edge}, {all_.core_.begin - origin_.z(), all_.core_.end - origin_.z()});
+    for (openvdb::Index column = 0; column < Int32Leaf::SIZE; column += edge) {
+      last_triangle_ = no_triangle;
+      for (int z = layers.begin; z < layers.end; ++z) {
+        const openvdb::Index v = column + static_cast<openvdb::Index>(z);
+        const float distance_mm = distances != nullptr ? distances->getValue(v) : tile_mm;
+        if (distance_mm > outside_mm) continue;
+        Found found{0, whole.inBand(v), no_triangle};
+        if (found.in_band ? distance_mm < -depth_mm : !(distance_mm < 0)) continue;
+        found.triangle = triangleOf(whole, found.in_band, v);
+        if (found.triangle == no_triangle) continue;
+        if (all_.parts_ != nullptr) takePart(found, v);
+        set(v, colourOf(found, v));
+      }
     }
   }
 
  private:
+  static constexpr std::uint32_t no_triangle = ~std::uint32_t{0};
+
   /// The nearest triangles of one solid.
   struct Nearest {
     const Int32Leaf* band = nullptr;
     std::array<const Int32Leaf*, edge> below{};  ///< by layer of the leaf
+
+    [[nodiscard]] bool inBand(openvdb::Index v) const {
+      return band != nullptr && band->getValueMask().isOn(v);
+    }
   };
-  /// The triangle nearest to a voxel, or to the middle of its group.
+  /// The triangle nearest to a voxel of the band, or below it to the middle of its group.
   struct Found {
     std::size_t solid;
+    bool in_band;
     std::uint32_t triangle;
-    std::optional<int> group;  ///< below the band
-    friend bool operator==(const Found&, const Found&) = default;
   };
 
   [[nodiscard]] const Nearest& nearestOf(std::size_t solid) {
@@ -154,47 +172,49 @@ class ColourField::Painter::LeafPainter {
     nearest.emplace();
     nearest->band = all_.bands_[solid].closest->tree().probeConstLeaf(origin_);
     if (const Int32Grid* below = all_.below_[solid].closest.get())
-      for (int z = 0; z < edge; ++z)
-        nearest->below[static_cast<std::size_t>(z)] = below->tree().probeConstLeaf(
-            {origin_.x(), origin_.y(), all_.groups_.of(origin_.z() + z)});
+      for (std::size_t z = 0; z < edge; ++z)
+        nearest->below[z] = below->tree().probeConstLeaf({origin_.x(), origin_.y(), group_[z]});
     return *nearest;
   }
 
-  [[nodiscard]] std::optional<Found> findIn(std::size_t solid, openvdb::Index v, const Coord& at) {
-    const Nearest& nearest = nearestOf(solid);
-    if (nearest.band != nullptr && nearest.band->isValueOn(v))
-      return Found{solid, static_cast<std::uint32_t>(nearest.band->getValue(v)), std::nullopt};
-    const Int32Leaf* below = nearest.below[static_cast<std::size_t>(at.z())];
-    if (below == nullptr) return std::nullopt;
-    const int group = all_.groups_.of(origin_.z() + at.z());
-    std::int32_t triangle = 0;
-    if (!below->probeValue({at.x(), at.y(), group}, triangle)) return std::nullopt;
-    return Found{solid, static_cast<std::uint32_t>(triangle), group};
+  [[nodiscard]] std::uint32_t triangleOf(const Nearest& nearest, bool in_band,
+                                         openvdb::Index v) const {
+    if (in_band) return static_cast<std::uint32_t>(nearest.band->getValue(v));
+    const std::size_t z = v % edge;
+    const Int32Leaf* below = nearest.below[z];
+    const openvdb::Index at = v - v % edge + static_cast<openvdb::Index>(group_[z] & (edge - 1));
+    return below != nullptr && below->getValueMask().isOn(at)
+               ? static_cast<std::uint32_t>(below->getValue(at))
+               : no_triangle;
   }
 
-  /// Returns where the colour of a voxel comes from, or nothing if it has none.
-  [[nodiscard]] std::optional<Found> find(openvdb::Index v, const Coord& at, float distance_mm) {
-    const std::optional<Found> found = findIn(0, v, at);
-    if (!found || (found->group && !(distance_mm < 0))) return std::nullopt;
-    if (!found->group && distance_mm < -all_.field_.depth_mm_) return std::nullopt;
-    if (all_.parts_ == nullptr) return found;
+  /// Replaces the triangle by one of the body that the voxel belongs to, if it has one nearby.
+  void takePart(Found& found, openvdb::Index v) {
     if (!parts_) parts_ = all_.parts_->tree().probeConstLeaf(origin_);
     const int part =
         *parts_ != nullptr ? (*parts_)->getValue(v) : all_.parts_->tree().getValue(origin_);
-    if (part < 1) return found;
-    const std::optional<Found> own = findIn(static_cast<std::size_t>(part), v, at);
-    return own ? own : found;
+    if (part < 1) return;
+    const auto solid = static_cast<std::size_t>(part);
+    const Nearest& nearest = nearestOf(solid);
+    const bool in_band = nearest.inBand(v);
+    const std::uint32_t triangle = triangleOf(nearest, in_band, v);
+    if (triangle != no_triangle) found = {solid, in_band, triangle};
   }
 
-  [[nodiscard]] Vec4f colourOf(const Found& found, const Coord& ijk) {
-    if (found.group && last_ && last_->first == found && last_xy_ == std::pair(ijk.x(), ijk.y()))
-      return last_->second;
-    Coord middle = ijk;
-    if (found.group) middle.z() = *found.group * all_.groups_.size;
+  [[nodiscard]] Vec4f colourOf(const Found& found, openvdb::Index v) {
+    const std::size_t z = v % edge;
+    if (!found.in_band && found.triangle == last_triangle_ && found.solid == last_solid_ &&
+        group_[z] == last_group_)
+      return last_colour_;
+    Coord ijk = colours_.offsetToGlobalCoord(v);
+    if (!found.in_band) ijk.z() = group_[z] * all_.groups_.size;
     const Vec4f colour = all_.field_.solids_[found.solid].colours.at(
-        found.triangle, all_.field_.lattice_.position(middle));
-    last_ = {found, colour};
-    last_xy_ = {ijk.x(), ijk.y()};
+        found.triangle, all_.field_.lattice_.position(ijk));
+    if (found.in_band) return colour;
+    last_triangle_ = found.triangle;
+    last_solid_ = found.solid;
+    last_group_ = group_[z];
+    last_colour_ = colour;
     return colour;
   }
 
@@ -209,8 +229,12 @@ class ColourField::Painter::LeafPainter {
   FloatLeaf* opacities_;
   std::vector<std::optional<Nearest>> nearest_;  ///< by solid, as they are needed
   std::optional<const Int32Leaf*> parts_;
-  std::optional<std::pair<Found, Vec4f>> last_;  ///< the colour found last
-  std::pair<int, int> last_xy_{};
+  std::array<int, edge> group_{};  ///< by layer of the leaf
+  // The colour found last below the band, in the same column.
+  std::uint32_t last_triangle_ = no_triangle;
+  std::size_t last_solid_ = 0;
+  int last_group_ = 0;
+  Vec4f last_colour_{};
 };
 
 ColourGrids ColourField::Painter::paint() const {

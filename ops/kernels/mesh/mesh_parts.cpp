@@ -1,9 +1,7 @@
 #include "ops/kernels/mesh/mesh_parts.h"
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <set>
 #include <string>
 #include <utility>
@@ -13,25 +11,24 @@
 namespace vdbdither {
 
 std::vector<Mesh> partsOf(Mesh mesh) {
-  constexpr auto none = std::numeric_limits<std::uint32_t>::max();
   std::set<std::string> names;
   std::vector<Mesh> parts;
+  // By vertex: its name in the last part that has it, and which part that is.
   std::vector<std::uint32_t> renamed(mesh.vertices.size());
+  std::vector<std::size_t> last_part(mesh.vertices.size(), mesh.parts.size());
   for (std::size_t i = 0; i < mesh.parts.size(); ++i) {
     names.insert(mesh.parts[i].name);
     Mesh& part = parts.emplace_back();
-    std::fill(renamed.begin(), renamed.end(), none);
     const std::size_t end =
         i + 1 < mesh.parts.size() ? mesh.parts[i + 1].begin : mesh.triangles.size();
     for (std::size_t t = mesh.parts[i].begin; t < end; ++t) {
       Mesh::Triangle& triangle = part.triangles.emplace_back(mesh.triangles[t]);
       for (std::uint32_t& corner : triangle) {
-        std::uint32_t& vertex = renamed[corner];
-        if (vertex == none) {
-          vertex = static_cast<std::uint32_t>(part.vertices.size());
+        if (std::exchange(last_part[corner], i) != i) {
+          renamed[corner] = static_cast<std::uint32_t>(part.vertices.size());
           part.vertices.push_back(mesh.vertices[corner]);
         }
-        corner = vertex;
+        corner = renamed[corner];
       }
     }
     if (names.size() <= i || !isBalanced(part)) {

@@ -33,6 +33,7 @@ double clipped(double value) { return std::min(1.0, std::max(0.0, value)); }
 Bytes exrOf(const std::vector<std::string>& names, bool is_half, const ExrFormat& format = {},
             std::uint32_t width = 19, std::uint32_t height = 11) {
   std::vector<ExrChannel> channels;
+  channels.reserve(names.size());
   for (const std::string& name : names) channels.push_back({name, is_half});
   return encodeExr(width, height, format, channels,
                    [](std::uint32_t row, std::size_t channel, std::span<float> values) {
@@ -101,8 +102,8 @@ TEST(TextureExr, HonoursPrimariesAndTheWindow) {
   Imf::Header header(Imath::Box2i({0, 0}, {99, 99}), Imath::Box2i({-3, 5}, {0, 6}));
   Imf::addChromaticities(header, Imf::Chromaticities({0.30F, 0.60F}, {0.15F, 0.06F}, {0.64F, 0.33F},
                                                      {0.3127F, 0.3290F}));
-  std::vector<float> values;
-  for (std::uint32_t i = 0; i < 24; ++i) values.push_back(static_cast<float>(i) / 24);
+  std::vector<float> values(24);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i) / 24;
   Imf::FrameBuffer buffer;
   for (const auto& [name, place] : {std::pair("R", 0), std::pair("G", 1), std::pair("B", 2)}) {
     header.channels().insert(name, Imf::Channel(Imf::FLOAT));

@@ -188,8 +188,9 @@ TEST(TextureTiff, PassesOverSamplesWithoutMeaning) {
 
 TEST(TextureTiff, ReadsFloatsAsLinearLight) {
   const Samples shape{9, 5, 3, 32};
-  std::vector<float> values;
-  for (int i = 0; i < 9 * 5 * 3; ++i) values.push_back(static_cast<float>(i % 17) / 12 - 0.1F);
+  std::vector<float> values(9 * 5 * 3);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = static_cast<float>(i % 17) / 12 - 0.1F;
   values[7] = std::nanf("");
   Bytes packed(values.size() * sizeof(float));
   std::memcpy(packed.data(), values.data(), packed.size());

@@ -95,6 +95,7 @@ TEST_F(ObjColoursTest, GivesEveryTriangleItsMaterial) {
                          triangle + "v 1 1 0\nf 1 2 3\nusemtl red # again\nf 1 2 3\n");
   EXPECT_THAT(warnings_, IsEmpty());
   std::vector<Vec4f> colours;
+  colours.reserve(mesh.triangles.size());
   for (const std::uint32_t material : mesh.appearance->material)
     colours.push_back(mesh.appearance->materials[material].colour);
   const Vec4f red = light(1, 0, 0);
@@ -178,6 +179,7 @@ TEST_F(ObjColoursTest, ReadsSeveralLibrariesAndNamesWithBlanks) {
                          "usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\nusemtl c\nf 1 2 3\n");
   EXPECT_THAT(warnings_, IsEmpty());
   std::vector<Vec4f> colours;
+  colours.reserve(mesh.appearance->materials.size());
   for (const SurfaceMaterial& material : mesh.appearance->materials)
     colours.push_back(material.colour);
   EXPECT_THAT(colours, ElementsAre(light(1, 0, 0), light(0, 1, 0), light(0, 0, 1)));
@@ -284,6 +286,7 @@ TEST_F(ObjColoursTest, DamageIsReadOrRefused) {
 
 std::vector<std::pair<std::string, std::uint32_t>> partsIn(const Mesh& mesh) {
   std::vector<std::pair<std::string, std::uint32_t>> parts;
+  parts.reserve(mesh.parts.size());
   for (const MeshPart& part : mesh.parts) parts.emplace_back(part.name, part.begin);
   return parts;
 }

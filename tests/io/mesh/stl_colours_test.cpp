@@ -36,6 +36,7 @@ std::vector<Vec4f> coloursOf(const std::string& bytes, std::size_t count) {
   expectSame(mesh, parse(bytes));
   std::vector<Vec4f> colours;
   if (mesh.appearance == nullptr) return colours;
+  colours.reserve(count);
   for (std::size_t i = 0; i < count; ++i)
     colours.push_back(mesh.appearance->materials.at(mesh.appearance->material.at(i)).colour);
   return colours;
