@@ -52,8 +52,25 @@ class ImageStacks(ProgramTest):
         self.assertEqual(done.returncode, 0, said)
         self.assertIn(warning, said)
         self.assertEqual(said.count("\n"), 1 if warning else 0, said)
-        grids, self.metadata = pyopenvdb.readAll(str(self.folder / "x.vdb"))
+        self.metadata = pyopenvdb.readMetadata(str(self.folder / "x.vdb"))
+        if "palette" in arguments:
+            return {}  # Debian's pyopenvdb reads no whole numbers; see `materials`
+        grids, _ = pyopenvdb.readAll(str(self.folder / "x.vdb"))
         return {grid.name: grid for grid in grids}
+
+    def materials(self):
+        """Returns the material of each voxel of the last import that has one, from its slices and its table."""
+        self.succeed("slice-export", "-i", "x.vdb", "slices", "--background", "0,0,0,0", "--overwrite")
+        indices = {tuple(entry["rgba"]): entry["index"] for entry in json.loads(self.metadata["vdbdither:materials"])}
+        found = {}
+        for z, path in enumerate(sorted((self.folder / "slices").glob("slice_*.png"))):
+            with Image.open(path) as image:
+                for x in range(image.width):
+                    for y in range(image.height):
+                        pixel = image.getpixel((x, image.height - 1 - y))
+                        if pixel[3]:
+                            found[x, y, z] = indices[pixel]
+        return found
 
     def voxels(self, grid):
         """Returns the active voxels of a grid with their values."""
@@ -70,24 +87,19 @@ class ImageStacks(ProgramTest):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.5, 24))
         for line in (("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "material-assign", "-o", "part.vdb"),
                      ("slice-export", "-i", "part.vdb", "stack", "--background", "0,0,0,0"),
-                     ("slice-export", "-i", "part.vdb", "bits", "--format", "tiff"),
-                     ("slice-import", "stack", "-o", "exact.vdb")):
+                     ("slice-export", "-i", "part.vdb", "bits", "--format", "tiff")):
             self.succeed(*line)
-        manifest = json.loads((self.folder / "stack/manifest.json").read_text())
-        names = {entry["index"]: "#%02x%02x%02x" % tuple(entry["rgba"][:3]) for entry in manifest["materials"]}
-        exact = {grid.name: grid for grid in pyopenvdb.readAll(str(self.folder / "exact.vdb"))[0]}
-        low = manifest["box"]["min"]
-
-        bottom = min(z for _, _, z in self.voxels(exact["solid"]))
+        pixels = {}
+        for path in sorted((self.folder / "stack").glob("slice_*.png")):
+            with Image.open(path) as image:
+                pixels[path.name] = image.tobytes()
         for stack in ("stack", "bits"):
             (self.folder / stack / "manifest.json").unlink()
             more = () if stack == "stack" else ("--background", "black")
-            grids = self.imported("--materials", "palette", *more, stack=stack, warning="a file is passed over, which is no slice: 'preview.png'")
-            self.assertEqual(set(grids), {"solid", "material"})
-            table = {entry["index"]: entry["name"] for entry in json.loads(self.metadata["vdbdither:materials"])}
-            shifted = {(x - low[0], y - low[1], z - bottom): names[value] for (x, y, z), value in self.voxels(exact["material"]).items()}
-            self.assertEqual({voxel: table[value] for voxel, value in self.voxels(grids["material"]).items()}, shifted)
-            self.assertEqual(set(self.voxels(grids["solid"])), set(shifted))
+            self.imported("--materials", "palette", *more, stack=stack, warning="a file is passed over, which is no slice: 'preview.png'")
+            self.succeed("slice-export", "-i", "x.vdb", "again", "--background", "0,0,0,0", "--overwrite")
+            again = {path.name: Image.open(path).tobytes() for path in sorted((self.folder / "again").glob("slice_*.png"))}
+            self.assertEqual(again, pixels, stack)
 
     def test_colours_become_linear_light_and_the_last_row_is_the_least_y(self):
         self.draw("a1.png", [[RED, CLEAR, GREEN], [CLEAR, CLEAR, FAINT]])
@@ -123,10 +135,10 @@ class ImageStacks(ProgramTest):
     def test_materials_are_numbered_in_the_order_of_their_first_pixels(self):
         self.draw("a1.png", [[CLEAR, GREEN], [RED, CLEAR]])
         self.draw("a2.png", [[FAINT, RED], [GREEN, CLEAR]])
-        grids = self.imported("--materials", "palette")
+        self.imported("--materials", "palette")
         self.assertEqual([(entry["index"], entry["name"], entry["rgba"]) for entry in json.loads(self.metadata["vdbdither:materials"])],
                          [(1, "#008000", list(GREEN)), (2, "#ff0000", list(RED)), (3, "#0000ff80", list(FAINT))])
-        self.assertEqual(self.voxels(grids["material"]), {(1, 1, 0): 1, (0, 0, 0): 2, (0, 1, 1): 3, (1, 1, 1): 2, (0, 0, 1): 1})
+        self.assertEqual(self.materials(), {(1, 1, 0): 1, (0, 0, 0): 2, (0, 1, 1): 3, (1, 1, 1): 2, (0, 0, 1): 1})
         self.refuse_import("--materials: 'ink' is not known; give palette", *PITCH, "--materials", "ink", code=2)
 
     def test_more_than_255_colours_are_no_materials(self):
@@ -155,7 +167,8 @@ class ImageStacks(ProgramTest):
         self.assertEqual(set(self.voxels(grids["solid"])), {(2, 0, 0), (3, 0, 0)})
         self.assertEqual(set(self.voxels(self.imported("--background", "white")["solid"])), {(0, 0, 0), (1, 0, 0)})
         self.refuse_import("--background: 'out/a1.png' is grey; give black or white", *PITCH, "--background", "#808080", code=2)
-        self.assertEqual(len(self.voxels(self.imported("--materials", "palette")["material"])), 3)
+        self.imported("--materials", "palette")
+        self.assertEqual(len(self.materials()), 3)
         for name in ("a1.png", "a1.tif"):
             (self.out / "a1.png").unlink(missing_ok=True)
             Image.fromarray(numpy.array([[0, 32767, 32768, 65535]], numpy.uint16)).save(self.out / name)
@@ -244,7 +257,7 @@ class ImageStacks(ProgramTest):
                            "DX,DY,DZ or --printer NAME")
         self.refuse_import("--edited: 'out' has no manifest.json; leave it out", *PITCH, "--edited", code=2)
         self.succeed("slice-import", "out", *MIMAKI, "-o", "x.vdb")
-        self.succeed("slice-export", "-i", "x.vdb", "stack", "--grid", "solid")
+        self.succeed("material-assign", "-i", "x.vdb", "!", "slice-export", "stack")
         for options in (PITCH, MIMAKI, ("--materials", "palette"), ("--background", "white"), ("--flip-x",), ("--flip-y",)):
             self.refuse(2, f"{options[0]}: the manifest.json of 'stack' states it; leave it out", "slice-import", "stack", *options, "-o", "y.vdb")
 
