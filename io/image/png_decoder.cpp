@@ -3,12 +3,17 @@
 #include <cstring>
 #include <vector>
 
+#include "io/image/colour_image.h"
 #include "io/image/png_source.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 
 SpanImage decodePng(std::span<const std::uint8_t> bytes, const SizeCheck& check) {
+  return decodePngImage(bytes, check).pixels;
+}
+
+ColourImage decodePngImage(std::span<const std::uint8_t> bytes, const SizeCheck& check) {
   PngSource source(bytes);
   png_structp png = source.png();
   png_infop info = source.info();
@@ -18,6 +23,9 @@ SpanImage decodePng(std::span<const std::uint8_t> bytes, const SizeCheck& check)
   if (check) check(width, height);
   if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE)
     throw DataError("is interlaced; save it without");
+  const int kind = png_get_color_type(png, info);
+  const bool has_opacity =
+      (kind & PNG_COLOR_MASK_ALPHA) != 0 || png_get_valid(png, info, PNG_INFO_tRNS) != 0;
   png_set_expand(png);
   png_set_strip_16(png);
   png_set_gray_to_rgb(png);
@@ -37,7 +45,9 @@ SpanImage decodePng(std::span<const std::uint8_t> bytes, const SizeCheck& check)
   }
   source.allowAll();
   png_read_end(png, nullptr);
-  return spans.finish();
+  return {.pixels = spans.finish(),
+          .is_grey = (kind & PNG_COLOR_MASK_COLOR) == 0,
+          .has_opacity = has_opacity};
 }
 
 }  // namespace vdbdither

@@ -92,6 +92,16 @@ StackInput::StackInput(const fs::path& path) : place_(path), manifest_name_(mani
   }
 }
 
+StackInput StackInput::withoutManifest(const fs::path& path) {
+  StackInput input;
+  input.place_ = path;
+  std::error_code none;
+  const fs::file_status status = fs::status(path.empty() ? "." : path, none);
+  if (!fs::exists(status)) throw DataError("no such file or folder '" + path.string() + "'");
+  if (!fs::is_directory(status)) input.zip_ = std::make_unique<ZipReader>(path);
+  return input;
+}
+
 StackInput StackInput::putBack(const fs::path& path,
                                const std::function<void(const std::string&)>& warn) {
   std::error_code none;

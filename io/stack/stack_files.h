@@ -52,7 +52,10 @@ class StackInput {
   /// `path`: a stack's folder, its manifest, or its zip archive. Throws DataError.
   explicit StackInput(const std::filesystem::path& path);
 
-  /// The same, after a folder that a killed run had put aside is put back, with a warning.
+  /// The files of a folder or a zip archive that has no manifest. Throws DataError.
+  static StackInput withoutManifest(const std::filesystem::path& path);
+
+  /// The first, after a folder that a killed run had put aside is put back, with a warning.
   static StackInput putBack(const std::filesystem::path& path,
                             const std::function<void(const std::string&)>& warn);
 
@@ -74,6 +77,7 @@ class StackInput {
                                                std::uint64_t most_bytes) const;
 
  private:
+  StackInput() = default;
   void refuseLinkOutside(const std::string& name) const;
 
   std::filesystem::path place_;

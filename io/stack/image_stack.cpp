@@ -1,0 +1,204 @@
+#include "io/stack/image_stack.h"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <map>
+#include <string_view>
+#include <utility>
+
+#include "io/stack/image_order.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/words.h"
+
+namespace vdbdither {
+
+namespace fs = std::filesystem;
+using namespace std::string_view_literals;
+
+namespace {
+
+constexpr std::uint64_t most_file_bytes = std::uint64_t{1} << 28;
+constexpr std::uint64_t most_pixels = std::uint64_t{1} << 28;
+
+constexpr std::array image_endings{".png", ".tif", ".tiff"};
+/// Images that are not read, for the refusal of a stack of them.
+constexpr std::array other_endings{".bmp", ".jpg", ".jpeg", ".gif", ".webp", ".exr",
+                                   ".svg", ".tga", ".pbm",  ".pgm", ".ppm"};
+
+template <typename Endings>
+bool endsWithAny(const std::string& name, const Endings& endings) {
+  const std::string ending = fs::path(name).extension().string();
+  return std::any_of(endings.begin(), endings.end(),
+                     [&](const char* known) { return equalsIgnoringCase(ending, known); });
+}
+
+bool isPng(const std::string& name) {
+  return equalsIgnoringCase(fs::path(name).extension().string(), ".png");
+}
+
+/// Whether `name` is `pattern` with any text in place of each `*`.
+bool matches(std::string_view name, std::string_view pattern) {
+  std::size_t star = pattern.find('*');
+  if (star == pattern.npos) return name == pattern;
+  if (!name.starts_with(pattern.substr(0, star))) return false;
+  name.remove_prefix(star);
+  pattern.remove_prefix(star + 1);
+  while ((star = pattern.find('*')) != pattern.npos) {
+    const std::size_t at = name.find(pattern.substr(0, star));
+    if (at == name.npos) return false;
+    name.remove_prefix(at + star);
+    pattern.remove_prefix(star + 1);
+  }
+  return name.ends_with(pattern);
+}
+
+bool isPattern(const fs::path& path) {
+  std::error_code none;
+  return path.filename().string().find('*') != std::string::npos &&
+         fs::symlink_status(path, none).type() == fs::file_type::not_found;
+}
+
+/// The images by the folder they lie in; hidden files, which file managers keep, are none.
+using ImagesByFolder = std::map<std::string, std::vector<std::string>>;
+
+/// Slices lie in the stack itself or, as some programs pack them, in its only folder with images.
+const std::vector<std::string>& slicesIn(const ImagesByFolder& images, const std::string& shown) {
+  const auto top = images.find("");
+  if (top != images.end()) return top->second;
+  if (images.size() > 1) {
+    throw DataError("'" + shown + "' has images in several folders, such as '" +
+                    images.begin()->first + "' and '" + std::next(images.begin())->first +
+                    "'; give the folder of the slices");
+  }
+  return images.begin()->second;
+}
+
+[[noreturn]] void refuseWithoutImages(const std::string& shown, bool is_pattern,
+                                      const std::vector<std::string>& passed_over) {
+  const auto other = std::find_if(passed_over.begin(), passed_over.end(), [](const auto& name) {
+    return endsWithAny(name, other_endings);
+  });
+  throw DataError(
+      (is_pattern ? "no PNG or TIFF image matches '" + shown + "'"
+                  : "'" + shown + "' holds no " + manifest_name + " and no PNG or TIFF images") +
+      (other == passed_over.end() ? "; give the folder of the slices"
+                                  : "; save images like '" + *other + "' as PNG"));
+}
+
+void tellLeftOut(const std::vector<std::string>& all, std::vector<std::string> slices,
+                 const std::string& shown, const std::function<void(const std::string&)>& warn) {
+  std::sort(slices.begin(), slices.end());
+  std::vector<std::string> others;
+  std::set_difference(all.begin(), all.end(), slices.begin(), slices.end(),
+                      std::back_inserter(others));
+  if (others.empty()) return;
+  warn("'" + shown + "': " +
+       (others.size() == 1 ? "a file is passed over, which is no slice: '"
+                           : std::to_string(others.size()) +
+                                 " files are passed over, which are no slices, such as '") +
+       others.front() + "'");
+}
+
+}  // namespace
+
+bool ImageStack::isAt(const fs::path& path) {
+  if (isPattern(path)) return true;
+  std::error_code none;
+  const fs::file_status status = fs::status(path, none);
+  if (fs::is_directory(status)) {
+    return fs::symlink_status(path / manifest_name, none).type() == fs::file_type::not_found;
+  }
+  if (!fs::is_regular_file(status) || equalsIgnoringCase(path.extension().string(), ".json"))
+    return false;
+  try {
+    return !StackInput::withoutManifest(path).contains(manifest_name);
+  } catch (const DataError&) {
+    return false;
+  }
+}
+
+ImageStack::ImageStack(fs::path path, const std::function<void(const std::string&)>& warn)
+    : path_(std::move(path)),
+      files_(StackInput::withoutManifest(isPattern(path_) ? path_.parent_path() : path_)),
+      names_(findImages(warn)) {
+  if (names_.size() > std::size_t{1} << 24)
+    throw DataError("'" + path_.string() + "' has more slices than can be counted");
+  const ColourImage first = read(0, [](std::uint32_t width, std::uint32_t height) {
+    if (std::uint64_t{width} * height <= most_pixels) return;
+    throw DataError("has " + std::to_string(width) + " x " + std::to_string(height) +
+                    " pixels; at most " + std::to_string(most_pixels) + " are read");
+  });
+  width_ = first.pixels.width;
+  height_ = first.pixels.height;
+  is_grey_ = first.is_grey;
+  has_opacity_ = first.has_opacity;
+}
+
+std::vector<std::string> ImageStack::findImages(
+    const std::function<void(const std::string&)>& warn) const {
+  const bool is_pattern = isPattern(path_);
+  const std::string pattern = path_.filename().string();
+  ImagesByFolder images;
+  std::vector<std::string> all;
+  std::vector<std::string> passed_over;
+  for (const std::string& name : files_.names()) {
+    const fs::path file(name);
+    const std::string folder = file.parent_path().string();
+    if (is_pattern && (!folder.empty() || !matches(name, pattern))) continue;
+    all.push_back(name);
+    if (endsWithAny(name, image_endings) && !file.filename().string().starts_with('.')) {
+      images[folder].push_back(name);
+    } else {
+      passed_over.push_back(name);
+    }
+  }
+  if (images.empty()) refuseWithoutImages(path_.string(), is_pattern, passed_over);
+  const std::vector<std::string> slices =
+      inOrderOfNumbers(slicesIn(images, path_.string()), path_.string());
+  const auto other_kind = std::find_if(slices.begin(), slices.end(), [&](const std::string& name) {
+    return isPng(name) != isPng(slices.front());
+  });
+  if (other_kind != slices.end()) {
+    throw DataError("'" + path_.string() + "': '" + slices.front() + "' and '" + *other_kind +
+                    "' are files of different kinds; save all slices alike");
+  }
+  tellLeftOut(all, slices, path_.string(), warn);
+  return slices;
+}
+
+ColourImage ImageStack::read(int z, const SizeCheck& check) const {
+  const std::string& name = names_.at(static_cast<std::size_t>(z));
+  files_.check(name, most_file_bytes);
+  const std::vector<std::uint8_t> bytes = files_.read(name, most_file_bytes);
+  try {
+    return isPng(name) ? decodePngImage(bytes, check) : decodeTiffImage(bytes, check);
+  } catch (const DataError& error) {
+    throw DataError("the slice '" + files_.shown(name) + "' " + error.what());
+  }
+}
+
+SpanImage ImageStack::layer(int z) const {
+  const auto unlike = [&](const std::string& has, const std::string& first_has) {
+    return "has " + has + ", but the first slice '" + shown(0) + "' has " + first_has +
+           "; save all slices alike";
+  };
+  ColourImage image = read(z, [&](std::uint32_t width, std::uint32_t height) {
+    if (width == width_ && height == height_) return;
+    const auto pixels = [](std::uint32_t columns, std::uint32_t rows) {
+      return std::to_string(columns) + " x " + std::to_string(rows) + " pixels";
+    };
+    throw DataError(unlike(pixels(width, height), pixels(width_, height_)));
+  });
+  const std::string slice = "the slice '" + shown(z) + "' ";
+  const auto colours = [](bool is_grey) { return is_grey ? "grey pixels" : "colours"; };
+  if (image.is_grey != is_grey_)
+    throw DataError(slice + unlike(colours(image.is_grey), colours(is_grey_)));
+  if (image.has_opacity != has_opacity_) {
+    throw DataError(slice +
+                    (has_opacity_ ? unlike("no opacity", "some") : unlike("opacity", "none")));
+  }
+  return std::move(image.pixels);
+}
+
+}  // namespace vdbdither
