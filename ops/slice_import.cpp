@@ -69,7 +69,7 @@ Footprint sampledFootprint(ZRange stored, ZRange layers, const Layer& layer) {
 /// Makes the tree of the layers in `core`, where `layer` makes the spans of one; 0 is inactive.
 template <typename Layer>
 openvdb::Int32Tree::Ptr treeOfLayers(ZRange core, const SliceLayout& layout, const Layer& layer) {
-  const auto tree = std::make_shared<openvdb::Int32Tree>(0);
+  auto tree = std::make_shared<openvdb::Int32Tree>(0);
   for (ZRange rows = alignedToLeaves(core); rows.begin < rows.end; rows.begin += leaf_layers) {
     const ZRange layers = intersection({rows.begin, rows.begin + leaf_layers}, core);
     std::vector<SpanImage> images(static_cast<std::size_t>(std::max(0, layers.size())));

@@ -154,7 +154,7 @@ std::vector<std::string> ImageStack::findImages(
     }
   }
   if (images.empty()) refuseWithoutImages(path_.string(), is_pattern, passed_over);
-  const std::vector<std::string> slices =
+  std::vector<std::string> slices =
       inOrderOfNumbers(slicesIn(images, path_.string()), path_.string());
   const auto other_kind = std::find_if(slices.begin(), slices.end(), [&](const std::string& name) {
     return isPng(name) != isPng(slices.front());
