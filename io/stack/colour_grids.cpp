@@ -15,7 +15,7 @@ namespace {
 
 template <typename Tree, typename Meaning>
 typename Tree::Ptr translated(const openvdb::Int32Tree& encoded, const Meaning& meaning) {
-  const auto tree =
+  auto tree =
       std::make_shared<Tree>(encoded, typename Tree::ValueType(0.0F), openvdb::TopologyCopy());
   auto tile = tree->beginValueOn();
   tile.setMaxDepth(Tree::ValueOnIter::LEAF_DEPTH - 1);
