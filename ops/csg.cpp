@@ -123,14 +123,13 @@ class CsgOperator : public Filter {
   template <class GridT>
   void addValues(const char* name, const Slab& in, const FloatGrid& surface,
                  const FloatGrid& others, Grids& out) const {
+    const auto find = [name](const Grids& grids) {
+      return grids.contains(name) ? findGrid<GridT>(grids, name) : nullptr;
+    };
     const Grids& second = in.inputs.at(0);
-    const auto mine = in.grids.contains(name) ? findGrid<GridT>(in.grids, name) : nullptr;
-    const auto theirs = second.contains(name) ? findGrid<GridT>(second, name) : nullptr;
-    if (!mine && !theirs) {
-      if (const auto empty = empty_values_.find(name); empty != empty_values_.end())
-        out[name] = empty->second;
-      return;
-    }
+    const auto mine = find(in.grids);
+    const auto theirs = find(second.contains(name) ? second : empty_values_);
+    if (!mine && !theirs) return;
     out[name] = combinedValues<GridT>(surface, others, mine.get(), theirs.get(), operation_,
                                       priority_ == Priority::second, in.core);
   }

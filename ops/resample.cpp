@@ -72,6 +72,9 @@ bool namesColours(const std::string& name) {
   return name == colour_grid || name == opacity_grid || name == "alpha";
 }
 
+/// The name that a grid of another program gets.
+std::string carriedName(const std::string& name) { return name == "alpha" ? opacity_grid : name; }
+
 /// Why a grid cannot be sampled at positions, or nothing.
 std::optional<std::string> sampleProblem(const GridBase& grid) {
   if (!SampledGrid::takes(grid))
@@ -231,7 +234,7 @@ class Resample : public Source {
     if (!with_.empty()) {
       for (const std::string& name : commaList(with_)) {
         if (!grids.contains(name)) throw UsageError("--with: no grid '" + name + "' in " + where);
-        if (name == grid_name_ || (name == surface_grid && grid_name_ != name))
+        if (name == grid_name_ || name == surface_grid)
           throw UsageError("--with: '" + name + "' is the name of the surface");
       }
     }
@@ -244,8 +247,7 @@ class Resample : public Source {
         continue;
       }
       checked(Grids::value_type(name, grid), where);
-      const std::string new_name = name == "alpha" ? opacity_grid : name;
-      if (!foreign_.emplace(new_name, grid).second)
+      if (!foreign_.emplace(carriedName(name), grid).second)
         throw UsageError("--with: both 'Alpha' and 'alpha' become 'Alpha'; name one of them");
     }
   }
@@ -256,7 +258,7 @@ class Resample : public Source {
   void tellUnused(const Grids& grids, bool is_clear) const {
     std::string others;
     for (const auto& [name, grid] : grids) {
-      if (name == grid_name_ || foreign_.contains(name == "alpha" ? opacity_grid : name)) continue;
+      if (name == grid_name_ || foreign_.contains(carriedName(name))) continue;
       others += (others.empty() ? "'" : ", '") + name + "' (" + grid->valueType() + ")";
     }
     const bool has_namesake = grids.contains(grid_name_ + "_2");

@@ -20,6 +20,7 @@
 #include "io/stack/image_stack.h"
 #include "io/stack/slice_spans.h"
 #include "io/stack/stack_reader.h"
+#include "ops/kernels/colour/empty_colours.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
@@ -306,13 +307,8 @@ class ImageLayers : public Input {
       return;
     }
     if (is_mask_) return;
-    const auto colour = emptyGrid<openvdb::Vec3SGrid>(colour_grid, schema_.lattice);
-    colour->setVectorType(openvdb::VEC_INVARIANT);
-    schema_.grids[colour_grid] = colour;
-    if (!stack_->hasOpacity()) return;
-    const auto opacity = emptyGrid<openvdb::FloatGrid>(opacity_grid, schema_.lattice);
-    opacity->setGridClass(openvdb::GRID_FOG_VOLUME);
-    schema_.grids[opacity_grid] = opacity;
+    schema_.grids[colour_grid] = emptyColours(schema_.lattice);
+    if (stack_->hasOpacity()) schema_.grids[opacity_grid] = emptyOpacities(schema_.lattice);
   }
 
   [[nodiscard]] bool isEmpty(std::uint32_t colour) const {

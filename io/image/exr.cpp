@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <new>
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
@@ -137,8 +136,7 @@ std::vector<std::uint8_t> encodeExr(std::uint32_t width, std::uint32_t height,
 
 SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& channel,
                     const SizeCheck& check) {
-  limitExrSizes();
-  try {
+  return readingExr([&] {
     ExrSource source(bytes);
     Imf::InputFile file(source, 0);
     const Imath::Box2i window = file.header().dataWindow();
@@ -170,13 +168,7 @@ SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& chan
       spans.endRow();
     }
     return spans.finish();
-  } catch (const DataError&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception&) {
-    throw DataError("is no readable EXR: it is damaged or of a kind that is not read");
-  }
+  });
 }
 
 }  // namespace vdbdither

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
+#include <new>
 #include <span>
 
 #include <ImfHeader.h>
@@ -43,6 +45,21 @@ inline void limitExrSizes() {
     return true;
   }();
   static_cast<void>(once);
+}
+
+/// Returns what `read` returns. What OpenEXR throws becomes a DataError.
+template <class Read>
+auto readingExr(const Read& read) {
+  limitExrSizes();
+  try {
+    return read();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
+    throw DataError("is not a readable EXR: it is damaged or of a kind that is not read");
+  }
 }
 
 }  // namespace vdbdither

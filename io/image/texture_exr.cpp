@@ -3,8 +3,6 @@
 #include <array>
 #include <cstdlib>
 #include <cstring>
-#include <exception>
-#include <new>
 #include <string>
 #include <vector>
 
@@ -30,7 +28,7 @@ constexpr int deep_flag = 0x800;
 constexpr int multi_part_flag = 0x1000;
 
 int exrNumber(Bytes bytes, std::size_t at) {
-  if (at + 4 > bytes.size()) throw DataError("is no readable EXR: it is cut short");
+  if (at + 4 > bytes.size()) throw DataError("is not a readable EXR: it is cut short");
   std::uint32_t value = 0;
   for (std::size_t i = 0; i < 4; ++i) value |= std::uint32_t{bytes[at + i]} << 8 * i;
   return static_cast<int>(value);
@@ -52,7 +50,7 @@ void checkExrAttributes(Bytes bytes, bool has_parts) {
       const int size = exrNumber(bytes, at);
       at += 4;
       if (size < 0 || at > bytes.size() || static_cast<std::size_t>(size) > bytes.size() - at)
-        throw DataError("is no readable EXR: it is cut short");
+        throw DataError("is not a readable EXR: it is cut short");
       at += static_cast<std::size_t>(size);
     }
     ++at;
@@ -115,7 +113,7 @@ ExrSize checkedExrSize(const Imf::Header& header, std::size_t file_bytes) {
   // Every chunk has eight bytes in a table.
   const std::uint64_t chunks =
       ((width + chunk_width - 1) / chunk_width) * ((height + chunk_height - 1) / chunk_height);
-  if (chunks > file_bytes / 8) throw DataError("is no readable EXR: it is cut short");
+  if (chunks > file_bytes / 8) throw DataError("is not a readable EXR: it is cut short");
   return {static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
 }
 
@@ -171,7 +169,7 @@ Texture readExrTexture(Bytes bytes, TextureOpacity opacity) {
   source.seekg(0);
   Imf::InputFile file(source, 0);
   const Imath::Box2i& window = file.header().dataWindow();
-  if (window != header.dataWindow()) throw DataError("is no readable EXR: it is damaged");
+  if (window != header.dataWindow()) throw DataError("is not a readable EXR: it is damaged");
   std::vector<float> row(size.width * names.size());
   Imf::FrameBuffer buffer;
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -192,16 +190,7 @@ Texture readExrTexture(Bytes bytes, TextureOpacity opacity) {
 }  // namespace
 
 Texture decodeExrTexture(Bytes bytes, TextureOpacity opacity) {
-  limitExrSizes();
-  try {
-    return readExrTexture(bytes, opacity);
-  } catch (const Error&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception&) {
-    throw DataError("is no readable EXR: it is damaged or of a kind that is not read");
-  }
+  return readingExr([&] { return readExrTexture(bytes, opacity); });
 }
 
 }  // namespace vdbdither

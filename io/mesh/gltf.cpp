@@ -8,7 +8,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -19,6 +18,7 @@
 #include "io/mesh/gltf_primitive.h"
 #include "io/mesh/gltf_scene.h"
 #include "io/mesh/mesh_format.h"
+#include "io/mesh/part_names.h"
 #include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
@@ -109,7 +109,7 @@ Container openGlb(const MeshFile& file) {
 void checkVersion(const MeshFile& file, const GltfValue& root) {
   const GltfValue asset = root["asset"];
   if (!asset.exists())
-    file.refuse("a JSON text without 'asset', which is no glTF; export " + meshFormatNames());
+    file.refuse("a JSON text without 'asset', which is not glTF; export " + meshFormatNames());
   for (const GltfValue& version : {asset["version"], asset["minVersion"]}) {
     if (version.exists() && !version.text().starts_with("2."))
       file.refuse("a glTF of version " + inQuotes(version.text()) + "; export glTF 2.0");
@@ -125,20 +125,6 @@ void checkExtensions(const MeshFile& file, const GltfValue& root) {
                   ", which is not read; export it without");
   }
 }
-
-/// Gives each part a name of its own.
-class PartNames {
- public:
-  std::string unique(const std::string& name) {
-    std::string chosen = name;
-    while (!taken_.try_emplace(chosen, 1).second)
-      chosen = name + " " + std::to_string(++taken_[name]);
-    return chosen;
-  }
-
- private:
-  std::unordered_map<std::string, std::uint64_t> taken_;  ///< and the last number behind it
-};
 
 class GltfReader {
  public:

@@ -153,7 +153,7 @@ void ThreemfBuild::place(const Key& key, const ThreemfTransform& transform, cons
   const std::string& nearest = object.name.empty() ? name : object.name;
   if (!object.triangles.empty()) {
     mesh_.parts.push_back(
-        {uniqueName(nearest.empty() ? "object " + std::to_string(object.id) : nearest),
+        {names_.unique(nearest.empty() ? "object " + std::to_string(object.id) : nearest),
          static_cast<std::uint32_t>(mesh_.triangles.size())});
     const bool is_turned = transform.determinant() < 0;
     if (placed) placed(parts_[key.first], object, is_turned);
@@ -189,14 +189,6 @@ void ThreemfBuild::append(ThreemfObject& object, const ThreemfTransform& transfo
     for (std::uint32_t& vertex : triangle) vertex += offset;
     if (is_turned) std::swap(triangle[1], triangle[2]);
   }
-}
-
-/// Returns "wheel", and "wheel 2" for the second.
-std::string ThreemfBuild::uniqueName(const std::string& name) {
-  std::string unique = name;
-  while (!uses_of_name_.try_emplace(unique, 1).second)
-    unique = name + " " + std::to_string(++uses_of_name_[name]);
-  return unique;
 }
 
 }  // namespace vdbdither

@@ -4,11 +4,11 @@
 #include <functional>
 #include <map>
 #include <string>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "io/mesh/mesh_file.h"
+#include "io/mesh/part_names.h"
 #include "io/mesh/threemf_model.h"
 #include "vdbdither/model/mesh.h"
 
@@ -50,7 +50,6 @@ class ThreemfBuild {
   void place(const Key& key, const ThreemfTransform& transform, const std::string& name,
              const Placed& placed);
   void append(ThreemfObject& object, const ThreemfTransform& transform, bool is_turned);
-  [[nodiscard]] std::string uniqueName(const std::string& name);
 
   const MeshFile& file_;
   std::vector<ThreemfPart>& parts_;
@@ -59,7 +58,7 @@ class ThreemfBuild {
   Mesh mesh_;
   bool is_only_use_ = false;  ///< of an object's vertices, which can then be moved
   std::uint64_t left_out_ = 0;
-  std::unordered_map<std::string, std::uint32_t> uses_of_name_;
+  PartNames names_;
 };
 
 }  // namespace vdbdither

@@ -43,11 +43,6 @@ class Surface:
         self.coordinates = coordinates  # v from top to bottom
         self.texture = texture
 
-    def fitted(self, length):
-        low, high = self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))
-        self.corners *= length / (high - low).max()
-        return self
-
     def nearest(self, p):
         """The nearest triangle to p, and the shares of its corners in the nearest point."""
         a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]

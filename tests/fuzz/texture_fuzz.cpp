@@ -3,28 +3,23 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <string_view>
 
 #include "io/image/texture.h"
-#include "vdbdither/model/errors.h"
+#include "tests/fuzz/sound_mesh.h"
 
 namespace vdbdither {
-
-static void requireTexture(bool condition) {
-  if (!condition) std::abort();
-}
 
 static void decodeAndCheck(std::string_view bytes) {
   try {
     const Texture texture = decodeTexture(bytes, "texture 'a'");
-    requireTexture(texture.width > 0 && texture.height > 0);
-    requireTexture(texture.texels.size() == std::size_t{texture.width} * texture.height);
+    require(texture.width > 0 && texture.height > 0);
+    require(texture.texels.size() == std::size_t{texture.width} * texture.height);
     for (const Texture::Texel& texel : texture.texels) {
-      for (std::size_t i = 0; i < 3; ++i) requireTexture(texel[i] <= texel[3]);
+      for (std::size_t i = 0; i < 3; ++i) require(texel[i] <= texel[3]);
     }
   } catch (const DataError& error) {
-    requireTexture(std::string_view(error.what()).find_first_of("\r\n") == std::string_view::npos);
+    require(isOneLine(error.what()));
   }
 }
 

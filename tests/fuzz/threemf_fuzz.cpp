@@ -2,26 +2,15 @@
 // returns a sound mesh with a sound appearance or refuses in one line. A seed is the text of a
 // model part, or a small 3MF file.
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <zlib.h>
 
-#include "io/mesh/mesh_reader.h"
-#include "vdbdither/model/errors.h"
+#include "tests/fuzz/sound_mesh.h"
 
 namespace vdbdither {
-
-static void require(bool condition) {
-  if (!condition) std::abort();
-}
-
-static bool isOneLine(std::string_view message) {
-  return message.find_first_of("\r\n") == std::string_view::npos;
-}
 
 /// A zip archive of one file, stored: APPNOTE.TXT of PKWARE, 4.3.
 static std::string archiveOf(std::string_view name, std::string_view content) {
@@ -43,50 +32,17 @@ static std::string archiveOf(std::string_view name, std::string_view content) {
          number(directory.size(), 4) + number(begin.size(), 4) + number(0, 2);
 }
 
-static void check(const Appearance& appearance, std::size_t triangles) {
-  require(appearance.material.size() == triangles);
-  for (const std::uint32_t material : appearance.material)
-    require(material < appearance.materials.size());
-  for (const SurfaceMaterial& material : appearance.materials)
-    require(material.texture == SurfaceMaterial::no_texture ||
-            material.texture < appearance.textures.size());
-  require(appearance.coordinates.empty() || appearance.coordinates.size() == triangles);
-  for (const Appearance::Coordinates& corners : appearance.coordinates) {
-    for (const openvdb::Vec2f& at : corners)
-      require(std::isfinite(at.x()) && std::isfinite(at.y()));
-  }
-  require(appearance.colours.empty() || appearance.colours.size() == triangles);
-}
-
-static void readAndCheck(std::string_view bytes) {
-  try {
-    const Mesh mesh = parseMesh(MeshFile(
-        "fuzz.3mf", bytes, [](const std::string& warning) { require(isOneLine(warning)); },
-        MeshColours::read));
-    require(!mesh.triangles.empty());
-    for (const openvdb::Vec3d& vertex : mesh.vertices) require(isFinite(vertex));
-    for (const Mesh::Triangle& triangle : mesh.triangles) {
-      for (const std::uint32_t vertex : triangle) require(vertex < mesh.vertices.size());
-    }
-    for (const MeshPart& part : mesh.parts) {
-      require(part.begin < mesh.triangles.size());
-      require(isOneLine(part.name));
-    }
-    if (mesh.appearance) check(*mesh.appearance, mesh.triangles.size());
-  } catch (const DataError& error) {
-    require(isOneLine(error.what()));
-  }
-}
-
 }  // namespace vdbdither
 
 // NOLINTNEXTLINE(readability-identifier-naming): the fuzzer calls it so
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
-  if (bytes.starts_with("PK")) {
-    vdbdither::readAndCheck(bytes);
-  } else {
-    vdbdither::readAndCheck(vdbdither::archiveOf("3D/3dmodel.model", bytes));
-  }
+  const bool is_archive = bytes.starts_with("PK");
+  const std::string archive =
+      is_archive ? std::string(bytes) : vdbdither::archiveOf("3D/3dmodel.model", bytes);
+  const vdbdither::Mesh mesh =
+      vdbdither::requireSoundMesh("no such folder/fuzz.3mf", archive, vdbdither::MeshColours::read);
+  for (const vdbdither::MeshPart& part : mesh.parts)
+    vdbdither::require(vdbdither::isOneLine(part.name));
   return 0;
 }

@@ -161,13 +161,14 @@ TEST_F(ResampleTest, RefusesWhatIsNoNumberAndWhatIsNoLattice) {
               ThrowsMessage<DataError>(HasSubstr("no such file 'nowhere.vdb'")));
 }
 
-/// The volume in mm3 of what `arguments` make on cubes of 0.1 mm, and what is said about it.
-struct Made {
-  double mm3 = 0;
+/// All grids that `arguments` make on cubes of 0.1 mm.
+struct Taken {
+  Grids grids;
+  Lattice lattice;
   std::vector<std::string> warnings;
 };
 
-Made made(std::vector<std::string> arguments) {
+Taken taken(std::vector<std::string> arguments) {
   arguments.insert(arguments.end(), {"--pitch", "0.1mm,0.1mm,0.1mm"});
   const auto verb = findOperator("resample").make();
   Options options;
@@ -177,11 +178,21 @@ Made made(std::vector<std::string> arguments) {
   options.parse(arguments);
   auto& source = dynamic_cast<Source&>(*verb);
   const Schema schema = source.plan();
-  const auto surface =
-      openvdb::gridConstPtrCast<FloatGrid>(source.run(schema.lattice.layers()).at("surface"));
+  return {source.run(schema.lattice.layers()), schema.lattice, listener.warnings};
+}
+
+/// The volume in mm3 of what `arguments` make on cubes of 0.1 mm, and what is said about it.
+struct Made {
+  double mm3 = 0;
+  std::vector<std::string> warnings;
+};
+
+Made made(std::vector<std::string> arguments) {
+  const Taken all = taken(std::move(arguments));
+  const auto surface = openvdb::gridConstPtrCast<FloatGrid>(all.grids.at("surface"));
   int inside = 0;
-  for (const Coord& ijk : schema.lattice.box) inside += surface->tree().getValue(ijk) < 0;
-  return {inside * 1e-3, listener.warnings};
+  for (const Coord& ijk : all.lattice.box) inside += surface->tree().getValue(ijk) < 0;
+  return {inside * 1e-3, all.warnings};
 }
 
 constexpr double ball_mm3 = 33.51;  ///< of 2 mm
@@ -358,26 +369,6 @@ openvdb::Vec3SGrid::Ptr positions(double reach_mm, double unit = 1) {
     if (at.length() < reach_mm) grid->tree().setValueOn(ijk, openvdb::Vec3s(at));
   }
   return grid;
-}
-
-/// All grids that `arguments` make on cubes of 0.1 mm.
-struct Taken {
-  Grids grids;
-  Lattice lattice;
-  std::vector<std::string> warnings;
-};
-
-Taken taken(std::vector<std::string> arguments) {
-  arguments.insert(arguments.end(), {"--pitch", "0.1mm,0.1mm,0.1mm"});
-  const auto verb = findOperator("resample").make();
-  Options options;
-  verb->declare(options);
-  test::Listener listener;
-  verb->setReporter(&listener);
-  options.parse(arguments);
-  auto& source = dynamic_cast<Source&>(*verb);
-  const Schema schema = source.plan();
-  return {source.run(schema.lattice.layers()), schema.lattice, listener.warnings};
 }
 
 /// Expects in `Cd` the position of each voxel that has a distance and is at most one diameter

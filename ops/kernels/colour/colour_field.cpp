@@ -9,16 +9,15 @@
 
 #include <tbb/parallel_for.h>
 
+#include "ops/kernels/colour/empty_colours.h"
+#include "ops/kernels/leaf/leaf_origins.h"
 #include "ops/kernels/leaf/node_writer.h"
-#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
 using openvdb::Coord;
-using openvdb::FloatGrid;
 using openvdb::Int32Grid;
 using openvdb::Vec3d;
-using openvdb::Vec3SGrid;
 using openvdb::Vec4f;
 
 namespace {
@@ -50,15 +49,8 @@ int layersWithin(const Vec3d& pitch_mm) {
 
 ColourGrids emptyGrids(const Lattice& lattice, bool has_opacity) {
   ColourGrids grids;
-  grids.colour = Vec3SGrid::create(openvdb::Vec3s(0, 0, 0));
-  grids.colour->setName(colour_grid);
-  grids.colour->setVectorType(openvdb::VEC_INVARIANT);
-  grids.colour->setTransform(transformOf(lattice));
-  if (!has_opacity) return grids;
-  grids.opacity = FloatGrid::create(0);
-  grids.opacity->setName(opacity_grid);
-  grids.opacity->setGridClass(openvdb::GRID_FOG_VOLUME);
-  grids.opacity->setTransform(transformOf(lattice));
+  grids.colour = emptyColours(lattice);
+  if (has_opacity) grids.opacity = emptyOpacities(lattice);
   return grids;
 }
 
@@ -83,8 +75,7 @@ class ColourField::Painter {
   /// Leaves that the band of the whole or the search below it meets, in order.
   [[nodiscard]] std::vector<Coord> leafOrigins() const {
     std::vector<Coord> origins;
-    for (auto leaf = bands_[0].closest->tree().cbeginLeaf(); leaf; ++leaf)
-      origins.push_back(leaf->origin());
+    appendLeafOrigins(bands_[0].closest->tree(), core_, origins);
     if (below_[0].closest) {
       for (auto leaf = below_[0].closest->tree().cbeginLeaf(); leaf; ++leaf) {
         const Coord origin = leaf->origin();
@@ -94,8 +85,7 @@ class ColourField::Painter {
           origins.emplace_back(origin.x(), origin.y(), z);
       }
     }
-    std::sort(origins.begin(), origins.end());
-    origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+    sortOnce(origins);
     return origins;
   }
 

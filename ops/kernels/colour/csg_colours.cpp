@@ -8,7 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/leaf_origins.h"
 #include "ops/kernels/leaf/node_writer.h"
 
 namespace vdbdither {
@@ -48,13 +48,9 @@ typename GridT::Ptr combinedValues(const FloatGrid& a, const FloatGrid& b, const
   using Leaf = typename TreeT::LeafNodeType;
   const GridT& like = of_a != nullptr ? *of_a : *of_b;
   std::vector<Coord> origins;
-  for (const GridT* grid : {of_a, of_b}) {
-    if (grid == nullptr) continue;
-    for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf)
-      if (rowWithin(leaf->origin().z(), core) != 0) origins.push_back(leaf->origin());
-  }
-  std::sort(origins.begin(), origins.end());
-  origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+  for (const GridT* grid : {of_a, of_b})
+    if (grid != nullptr) appendLeafOrigins(grid->tree(), core, origins);
+  sortOnce(origins);
 
   std::vector<std::unique_ptr<Leaf>> made(origins.size());
   tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t n) {

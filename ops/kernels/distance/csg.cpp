@@ -10,6 +10,7 @@
 
 #include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/leaf_origins.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/surface_leaves.h"
 #include "ops/kernels/leaf/tie.h"
@@ -29,11 +30,8 @@ using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>;
 /// Returns the leaves of either, each once.
 std::vector<Coord> leafOrigins(const FloatGrid& a, const FloatGrid& b, ZRange core) {
   std::vector<Coord> origins;
-  for (const FloatGrid* grid : {&a, &b}) {
-    for (const FloatLeaf* leaf : leavesIn(grid->tree(), core)) origins.push_back(leaf->origin());
-  }
-  std::sort(origins.begin(), origins.end());
-  origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+  for (const FloatGrid* grid : {&a, &b}) appendLeafOrigins(grid->tree(), core, origins);
+  sortOnce(origins);
   return origins;
 }
 
@@ -113,14 +111,9 @@ Int32Grid::Ptr unitedParts(const FloatGrid& a, const FloatGrid& b, const Int32Gr
 
   // Where either has a leaf of distances or of parts, voxels are assigned one by one.
   std::vector<Coord> origins = leafOrigins(a, b, core);
-  for (const Int32Grid* parts : {a_parts, b_parts}) {
-    if (!parts) continue;
-    for (auto leaf = parts->tree().cbeginLeaf(); leaf; ++leaf) {
-      if (rowWithin(leaf->origin().z(), core) != 0) origins.push_back(leaf->origin());
-    }
-  }
-  std::sort(origins.begin(), origins.end());
-  origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+  for (const Int32Grid* parts : {a_parts, b_parts})
+    if (parts) appendLeafOrigins(parts->tree(), core, origins);
+  sortOnce(origins);
 
   struct Side {
     Side(const FloatGrid& surface, const Int32Grid* grid_of_parts, int first)

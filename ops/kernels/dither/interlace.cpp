@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/leaf_origins.h"
 #include "ops/kernels/leaf/solid.h"
 
 namespace vdbdither {
@@ -95,8 +96,7 @@ openvdb::BoolGrid::Ptr interlacedByPicking(const openvdb::FloatGrid& refined, ZR
   std::vector<Coord>& origins = tiles.leaves;
   for (const FloatLeaf* leaf : leavesIn(refined.tree(), core))
     origins.push_back(plainOrigin(leaf->origin()));
-  std::sort(origins.begin(), origins.end());
-  origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+  sortOnce(origins);
 
   std::vector<SolidLeaf> printed(origins.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size()), [&](const auto& range) {
