@@ -10,7 +10,7 @@ namespace vdbdither {
 namespace {
 
 [[noreturn]] void refusePng(png_structp, png_const_charp) {
-  throw DataError("is no readable PNG: it is damaged");
+  throw DataError("is not a readable PNG: it is damaged");
 }
 
 void ignorePngWarning(png_structp, png_const_charp) {}
@@ -32,8 +32,9 @@ PngSource::PngSource(std::span<const std::uint8_t> bytes) : bytes_(bytes) {
 
 void PngSource::read(png_structp png, png_bytep data, std::size_t size) {
   auto& self = *static_cast<PngSource*>(png_get_io_ptr(png));
-  if (size > self.bytes_.size()) throw DataError("is no readable PNG: it is cut short");
-  if (size > self.allowance_) throw DataError("is no readable PNG: it holds more than its pixels");
+  if (size > self.bytes_.size()) throw DataError("is not a readable PNG: it is cut short");
+  if (size > self.allowance_)
+    throw DataError("is not a readable PNG: it holds more than its pixels");
   if (self.allowance_ != unlimited) self.allowance_ -= size;
   std::copy_n(self.bytes_.begin(), size, data);
   self.bytes_ = self.bytes_.subspan(size);

@@ -80,7 +80,7 @@ Texture decodeTexture(std::string_view bytes, const std::string& shown, TextureO
   if (kind == nullptr && isSvg(bytes))
     throw DataError(shown + " is SVG, which is not read" + std::string(what_to_do));
   if (kind == nullptr)
-    throw DataError(shown + " is no image of a kind that is read" + std::string(what_to_do));
+    throw DataError(shown + " is not an image in a format that is read" + std::string(what_to_do));
   if (kind->decode == nullptr) {
     throw DataError(shown + " is " + std::string(kind->name) + ", which is not read" +
                     std::string(what_to_do));

@@ -116,7 +116,7 @@ Texture decodeJpegTexture(Bytes bytes, TextureOpacity opacity) {
   const int header = tjDecompressHeader3(decoder.get(), bytes.data(), bytes.size(), &width, &height,
                                          &subsampling, &colour_space);
   if ((header != 0 && !isHarmless(decoder.get())) || width < 1 || height < 1)
-    throw DataError("is no readable JPEG: it is damaged or of a rare kind; save it again");
+    throw DataError("is not a readable JPEG: it is damaged or of a rare kind; save it again");
   checkTextureSize(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), 4,
                    bytes.size());
   const JpegMarkers markers = markersOf(bytes);
@@ -133,7 +133,7 @@ Texture decodeJpegTexture(Bytes bytes, TextureOpacity opacity) {
   if (tjDecompress2(decoder.get(), bytes.data(), bytes.size(), rows.data(), width, 0, height,
                     kind.format, TJFLAG_ACCURATEDCT | TJFLAG_LIMITSCANS) != 0 &&
       !isHarmless(decoder.get()))
-    throw DataError("is no readable JPEG: it is damaged or cut short; save it again");
+    throw DataError("is not a readable JPEG: it is damaged or cut short; save it again");
 
   const bool is_inverted = kind.channels == 4 && markers.is_adobe;
   TextureBuilder builder(static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height),

@@ -68,7 +68,7 @@ Texture decodePngTexture(std::span<const std::uint8_t> bytes, TextureOpacity opa
   const std::uint32_t height = png_get_image_height(png, info);
   checkTextureSize(width, height, (png_get_rowbytes(png, info) + width - 1) / width, bytes.size());
   if (png_get_rowbytes(png, info) * std::uint64_t{height} / deflate_ratio > bytes.size())
-    throw DataError("is no readable PNG: it is cut short");
+    throw DataError("is not a readable PNG: it is cut short");
 
   const ColourSpace space = pngColourSpace(png, info);
   const bool is_interlaced = png_get_interlace_type(png, info) != PNG_INTERLACE_NONE;

@@ -31,7 +31,7 @@ std::vector<std::uint8_t> webpProfile(std::span<const std::uint8_t> bytes) {
 Texture decodeWebpTexture(std::span<const std::uint8_t> bytes, TextureOpacity opacity) {
   WebPBitstreamFeatures features{};
   if (WebPGetFeatures(bytes.data(), bytes.size(), &features) != VP8_STATUS_OK)
-    throw DataError("is no readable WebP: it is damaged; save it again");
+    throw DataError("is not a readable WebP: it is damaged; save it again");
   if (features.has_animation != 0) throw DataError("is an animation; save a single image");
   const auto width = static_cast<std::uint32_t>(features.width);
   const auto height = static_cast<std::uint32_t>(features.height);
@@ -44,7 +44,7 @@ Texture decodeWebpTexture(std::span<const std::uint8_t> bytes, TextureOpacity op
   const auto decode = features.has_alpha != 0 ? WebPDecodeRGBAInto : WebPDecodeRGBInto;
   if (decode(bytes.data(), bytes.size(), rows.data(), rows.size(), static_cast<int>(row_bytes)) ==
       nullptr)
-    throw DataError("is no readable WebP: it is damaged or cut short; save it again");
+    throw DataError("is not a readable WebP: it is damaged or cut short; save it again");
 
   TextureBuilder builder(width, height, layout, {webpProfile(bytes), {}, {}}, opacity);
   for (std::uint32_t y = 0; y < height; ++y) builder.row(rows.data() + y * row_bytes);

@@ -75,7 +75,7 @@ SpanImage decodeTiff(std::span<const std::uint8_t> bytes, const SizeCheck& check
   TiffMemory memory;
   memory.read = bytes;
   const TiffHandle tiff = openTiff(memory, "r");
-  const auto refuse = [&] { return DataError("is no readable TIFF: it is damaged"); };
+  const auto refuse = [&] { return DataError("is not a readable TIFF: it is damaged"); };
   if (!tiff) throw refuse();
   std::uint32_t width = 0;
   std::uint32_t height = 0;

@@ -10,7 +10,7 @@
 namespace vdbdither {
 
 inline constexpr const char* damaged_tiff =
-    "is no readable TIFF: it is damaged or cut short; save it again";
+    "is not a readable TIFF: it is damaged or cut short; save it again";
 
 /// What the tags of a TIFF say of its pixels.
 struct TiffHead {

@@ -39,14 +39,14 @@ Type readType(const GltfValue& json) {
   const auto found = std::find_if(types.begin(), types.end(), [&](Type type) {
     return static_cast<std::uint64_t>(type) == code;
   });
-  if (found == types.end()) json.refuse("is no type of components");
+  if (found == types.end()) json.refuse("is not a component type");
   return *found;
 }
 
 std::uint32_t readComponents(const GltfValue& json) {
   constexpr std::array<std::string_view, 4> names{"SCALAR", "VEC2", "VEC3", "VEC4"};
   const auto* const found = std::find(names.begin(), names.end(), json.text());
-  if (found == names.end()) json.refuse("is no type of vertex data");
+  if (found == names.end()) json.refuse("must be SCALAR, VEC2, VEC3 or VEC4");
   return static_cast<std::uint32_t>(found - names.begin() + 1);
 }
 
@@ -149,7 +149,7 @@ void GltfAccessors::readSparse(const GltfValue& json, GltfAccessor& accessor) {
   GltfAccessor indices;
   indices.type = readType(places["componentType"]);
   if (indices.type != Type::uint8 && indices.type != Type::uint16 && indices.type != Type::uint32)
-    places["componentType"].refuse("is no type of indices");
+    places["componentType"].refuse("must be a type of unsigned integers");
   if (count > accessor.count) json["count"].refuse("is more than the accessor holds");
   indices.count = count;
   indices.stride = bytesOf(indices.type);

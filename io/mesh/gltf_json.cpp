@@ -47,7 +47,7 @@ class Checker : public nlohmann::json_sax<json> {
     if (error.id == number_out_of_range)
       file_.refuseAtByte(text_.data() + at, "here a number is too large; export the file again");
     file_.refuseAtByte(text_.data() + at,
-                       "here the text is no JSON; export or download the file again");
+                       "here the text is not JSON; export or download the file again");
   }
 
  private:
@@ -93,14 +93,14 @@ GltfValue GltfJson::root() const { return {file_, json_.get(), ""}; }
 GltfValue GltfValue::operator[](std::string_view key) const {
   const std::string path = (path_.empty() ? "" : path_ + ".") + std::string(key);
   if (json_ == nullptr) return {*file_, nullptr, path};
-  if (!json_->is_object()) refuse("is no object");
+  if (!json_->is_object()) refuse("must be an object");
   const auto found = json_->find(key);
   return {*file_, found == json_->end() ? nullptr : &*found, path};
 }
 
 std::size_t GltfValue::size() const {
   if (json_ == nullptr) return 0;
-  if (!json_->is_array()) refuse("is no array");
+  if (!json_->is_array()) refuse("must be an array");
   return json_->size();
 }
 
@@ -119,7 +119,7 @@ std::uint64_t GltfValue::count() const {
     return json_->get<std::uint64_t>();
   const double value = json_->is_number_float() ? json_->get<double>() : -1;
   if (!(value >= 0 && value <= static_cast<double>(most_count)) || value != std::floor(value))
-    refuse("is no count");
+    refuse("must be a whole number from 0 on");
   return static_cast<std::uint64_t>(value);
 }
 
@@ -129,13 +129,13 @@ std::uint64_t GltfValue::count(std::uint64_t otherwise) const {
 
 double GltfValue::number(double otherwise) const {
   if (json_ == nullptr) return otherwise;
-  if (!json_->is_number()) refuse("is no number");
+  if (!json_->is_number()) refuse("must be a number");
   return json_->get<double>();
 }
 
 std::string_view GltfValue::text() const {
   if (json_ == nullptr) return {};
-  if (!json_->is_string()) refuse("is no text");
+  if (!json_->is_string()) refuse("must be a text");
   return json_->get_ref<const std::string&>();
 }
 

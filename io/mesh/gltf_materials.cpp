@@ -28,7 +28,7 @@ TextureWrap wrapOf(const GltfValue& json) {
   const std::uint64_t code = json.count(repeat);
   if (code == mirrored_repeat) return TextureWrap::mirror;
   if (code == clamp_to_edge) return TextureWrap::clamp;
-  if (code != repeat) json.refuse("is no way to wrap a texture");
+  if (code != repeat) json.refuse("is not a wrapping mode");
   return TextureWrap::repeat;
 }
 
@@ -69,7 +69,7 @@ std::optional<GltfMaterials::Texture> GltfMaterials::textureOf(
 bool GltfMaterials::hasOpacity(std::optional<std::uint64_t> material) const {
   const GltfValue mode = json(material)["alphaMode"];
   if (!mode.exists() || mode.text() == "OPAQUE") return false;
-  if (mode.text() != "MASK" && mode.text() != "BLEND") mode.refuse("is no mode of opacity");
+  if (mode.text() != "MASK" && mode.text() != "BLEND") mode.refuse("must be OPAQUE, MASK or BLEND");
   return true;
 }
 

@@ -87,7 +87,7 @@ constexpr std::uint64_t bytes_per_triangle = sizeof(Mesh::Triangle);
 GltfPrimitive GltfPrimitives::read(const GltfValue& json) {
   throwIfInterrupted();
   const std::uint64_t mode = json["mode"].count(triangles_mode);
-  if (mode > fan_mode) json["mode"].refuse("is no mode of primitives");
+  if (mode > fan_mode) json["mode"].refuse("must be a whole number from 0 to 6");
   if (mode < triangles_mode) {
     ++omissions_.points_and_lines;
     return {};
@@ -134,7 +134,8 @@ GltfPrimitive GltfPrimitives::readDraco(const GltfValue& json, const GltfValue& 
         [&](const std::string& name, bool is_colour) {
           const GltfValue id = compression["attributes"][name];
           if (!id.exists()) return fromAccessor(attributes[name], points, points.size(), is_colour);
-          if (id.count() > std::numeric_limits<std::uint32_t>::max()) id.refuse("is no identifier");
+          if (id.count() > std::numeric_limits<std::uint32_t>::max())
+            id.refuse("must be a whole number of 32 bits");
           const DracoValues from = draco.valuesOf(static_cast<std::uint32_t>(id.count()));
           const GltfValue accessor = attributes[name].exists()
                                          ? attributes[name]

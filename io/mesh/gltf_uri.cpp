@@ -92,7 +92,7 @@ std::optional<std::vector<std::uint8_t>> decodeDataUri(const MeshFile& file,
 std::string pathOfUri(const MeshFile& file, std::string_view kind, std::string_view uri) {
   if (!schemeOf(uri).empty()) {
     file.refuse(std::string(kind) + " " + inQuotes(uri) +
-                " is no file in the folder of the mesh; put it there and name it by a relative "
+                " is not a file in the folder of the mesh; put it there and name it by a relative "
                 "path");
   }
   return percentDecoded(uri);

@@ -373,7 +373,7 @@ ThreemfColour ThreemfModelReader::colourOf(const XmlElement& element, std::strin
   }
   if (!is_fine) {
     refuse(inWords(element, name) + " " + inQuotes(text) +
-           " is no colour; #RRGGBB and #RRGGBBAA are read");
+           " is not a colour; #RRGGBB and #RRGGBBAA are read");
   }
   return colour;
 }

@@ -171,7 +171,7 @@ void XmlReader::parse(std::span<const std::uint8_t> bytes, bool is_last) {
     case XML_ERROR_TAG_MISMATCH:
       refuse("ends an element that did not begin; export it again");
     default:
-      refuse("is no well-formed XML; export it again");
+      refuse("is not well-formed XML; export it again");
   }
 }
 

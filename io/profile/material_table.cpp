@@ -52,7 +52,7 @@ std::optional<std::array<std::uint8_t, 4>> rgbaOf(const ordered_json& json) {
 
 std::array<std::uint8_t, 4> parseColour(std::string_view text) {
   const UsageError error("'" + std::string(text) +
-                         "' is no colour; give #rrggbb or r,g,b of 0 to 255");
+                         "' is not a colour; give #rrggbb or r,g,b of 0 to 255");
   std::array<std::uint8_t, 4> rgba = {0, 0, 0, 255};
   const bool hexadecimal = text.starts_with('#');
   if (hexadecimal) text.remove_prefix(1);

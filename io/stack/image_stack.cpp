@@ -94,9 +94,9 @@ void tellLeftOut(const std::vector<std::string>& all, std::vector<std::string> s
                       std::back_inserter(others));
   if (others.empty()) return;
   warn("'" + shown + "': " +
-       (others.size() == 1 ? "a file is passed over, which is no slice: '"
+       (others.size() == 1 ? "a file is passed over, which is not a slice: '"
                            : std::to_string(others.size()) +
-                                 " files are passed over, which are no slices, such as '") +
+                                 " files are passed over, which are not slices, such as '") +
        others.front() + "'");
 }
 

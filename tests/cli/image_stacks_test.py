@@ -96,7 +96,7 @@ class ImageStacks(ProgramTest):
         for stack in ("stack", "bits"):
             (self.folder / stack / "manifest.json").unlink()
             more = () if stack == "stack" else ("--background", "black")
-            self.imported("--materials", "palette", *more, stack=stack, warning="a file is passed over, which is no slice: 'preview.png'")
+            self.imported("--materials", "palette", *more, stack=stack, warning="a file is passed over, which is not a slice: 'preview.png'")
             self.succeed("slice-export", "-i", "x.vdb", "again", "--background", "0,0,0,0", "--overwrite")
             again = {path.name: Image.open(path).tobytes() for path in sorted((self.folder / "again").glob("slice_*.png"))}
             self.assertEqual(again, pixels, stack)
@@ -155,7 +155,7 @@ class ImageStacks(ProgramTest):
         self.assertEqual(set(self.imported()), {"solid", "Cd"})
         self.assertEqual(set(self.voxels(self.imported("--background", "white")["solid"])), {(1, 0, 0), (2, 0, 0)})
         self.assertEqual(set(self.voxels(self.imported("--background", "#ff0000")["solid"])), {(0, 0, 0), (1, 0, 0)})
-        self.refuse_import("--background: 'paper' is no colour; give #rrggbb or r,g,b of 0 to 255", *PITCH, "--background", "paper", code=2)
+        self.refuse_import("--background: 'paper' is not a colour; give #rrggbb or r,g,b of 0 to 255", *PITCH, "--background", "paper", code=2)
         self.draw("a1.png", [[RED, (0, 0, 0, 255), CLEAR]])
         self.assertEqual(set(self.voxels(self.imported()["solid"])), {(0, 0, 0), (1, 0, 0)})
         self.assertEqual(set(self.voxels(self.imported("--background", "black")["solid"])), {(0, 0, 0)})
@@ -233,7 +233,7 @@ class ImageStacks(ProgramTest):
         self.draw_plain("thumbnails/a1.png", size=(2, 2))
         for name in ("Thumbs.db", "job.xml", "notes.txt", "._a1.png"):
             (self.out / name).write_text("x")
-        self.assertEqual(len(self.voxels(self.imported(warning="'out': 5 files are passed over, which are no slices, such as '._a1.png'")["solid"])), 22)
+        self.assertEqual(len(self.voxels(self.imported(warning="'out': 5 files are passed over, which are not slices, such as '._a1.png'")["solid"])), 22)
         self.imported(stack="out/a*.png")
 
     def test_an_archive_is_read_like_its_folder(self):
@@ -271,7 +271,7 @@ class ImageStacks(ProgramTest):
     def test_hostile_images_are_refused_in_limited_time_and_memory(self):
         path = self.out / "a1.png"
         path.write_bytes(b"no image")
-        self.refuse_import("the slice 'out/a1.png' is no readable PNG: ", *PITCH)
+        self.refuse_import("the slice 'out/a1.png' is not a readable PNG: ", *PITCH)
         Image.new("1", (60000, 60000)).save(path)
         self.refuse_import("the slice 'out/a1.png' has 60000 x 60000 pixels; at most 268435456 are read", *PITCH)
         os.truncate(path, 1 << 40)
@@ -289,7 +289,7 @@ class ImageStacks(ProgramTest):
         Image.new("CMYK", (2, 2)).save(self.out / "a1.tif")
         self.refuse_import("is a TIFF of a kind that is not read; save it as grey or RGB", *PITCH)
         (self.out / "a1.tif").write_bytes(b"II*\0" + bytes(20))
-        self.refuse_import("the slice 'out/a1.tif' is no readable TIFF: ", *PITCH)
+        self.refuse_import("the slice 'out/a1.tif' is not a readable TIFF: ", *PITCH)
 
     def test_explain_knows_the_stack(self):
         self.draw_plain("a1.png", "a2.png")

@@ -191,7 +191,7 @@ class Stacks(ProgramTest):
         content = self.slice(1).read_bytes()
         start = content.index(b"IDAT") - 4
         self.slice(1).write_bytes(content[:start] + chunk(b"IDAT", zlib.compress(bytes(400 << 20))) + chunk(b"IEND", b""))
-        self.refuse_import("is no readable PNG: ", "out", "--edited")
+        self.refuse_import("is not a readable PNG: ", "out", "--edited")
 
     def test_a_manifest_that_inflates_is_refused(self):
         self.pack(members=[("manifest.json", b" " * (200 << 20))], without=["manifest.json"], method=zipfile.ZIP_STORED)

@@ -329,7 +329,7 @@ TEST(SliceExport, RefusesWhatItCannotSlice) {
                   "--background: the material 'black' has the colour 26,26,29; choose another"));
   EXPECT_THAT(planned(smallJob(), {"--background", "grey"}),
               ThrowsMessage<UsageError>(
-                  "--background: 'grey' is no colour; give #rrggbb or r,g,b of 0 to 255"));
+                  "--background: 'grey' is not a colour; give #rrggbb or r,g,b of 0 to 255"));
   EXPECT_THAT(
       planned(smallJob(), {"--prefix", "a/b"}),
       ThrowsMessage<UsageError>("--prefix: the name of a slice, 'a/b00000.png', contains '/'"));

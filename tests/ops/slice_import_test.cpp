@@ -242,7 +242,7 @@ TEST_F(SliceImport, RefusesSlicesOfOtherSizesAndUnknownColours) {
                   "which no material of the manifest has; give it one of theirs, and mind that "
                   "smoothing makes new colours")));
   std::ofstream(scratch_ / "out/slice_00003.png") << "no image";
-  EXPECT_THAT(whole, ThrowsMessage<DataError>(HasSubstr("layer 3 is no readable PNG: ")));
+  EXPECT_THAT(whole, ThrowsMessage<DataError>(HasSubstr("layer 3 is not a readable PNG: ")));
 }
 
 TEST_F(SliceImport, RefusesMaterialsOfOneColourAndVoxelsOfTwoMaterials) {

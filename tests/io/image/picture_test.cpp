@@ -49,7 +49,7 @@ TEST(Pictures, WhatCannotBeReadIsTold) {
               ThrowsMessage<DataError>(HasSubstr("no such file '")));
   std::ofstream(scratch / "text.png") << "no picture at all";
   EXPECT_THAT([&] { readPicture(scratch / "text.png"); },
-              ThrowsMessage<DataError>(HasSubstr("text.png' is no readable PNG")));
+              ThrowsMessage<DataError>(HasSubstr("text.png' is not a readable PNG")));
   EXPECT_THAT([] { encodePicture({}); },
               ThrowsMessage<DataError>(HasSubstr("the picture cannot be written")));
 }

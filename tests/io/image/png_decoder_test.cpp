@@ -51,7 +51,7 @@ TEST(PngDecoder, DamageIsAnError) {
     const std::vector<std::uint8_t> part(bytes.begin(),
                                          bytes.begin() + static_cast<std::ptrdiff_t>(size));
     EXPECT_THAT([&] { decodePng(part); },
-                ThrowsMessage<DataError>(HasSubstr("is no readable PNG: ")));
+                ThrowsMessage<DataError>(HasSubstr("is not a readable PNG: ")));
   }
   bytes[bytes.size() / 2] ^= 16;
   EXPECT_THROW(decodePng(bytes), DataError);
@@ -104,7 +104,7 @@ TEST(PngDecoder, DoesNotInflateWhatIsNoPixel) {
   text.insert(text.end(), packed.begin(), packed.end());
   EXPECT_EQ(decodePng(tinyPng({0, 0, 0, 0, 0, 0, 0, 0, 0}, chunk("zTXt", text))), black);
   EXPECT_THAT([&] { decodePng(tinyPng(zeros, {})); },
-              ThrowsMessage<DataError>("is no readable PNG: it holds more than its pixels"));
+              ThrowsMessage<DataError>("is not a readable PNG: it holds more than its pixels"));
 }
 
 }  // namespace

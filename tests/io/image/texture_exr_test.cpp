@@ -160,7 +160,7 @@ TEST(TextureExr, RefusesWhatAHeaderOnlyClaims) {
     huge[at + 1] = 0x0F;
     huge[at + 2] = 0;
   }
-  EXPECT_EQ(test::textureRefusal(huge), "texture 'a' is no readable EXR: it is cut short");
+  EXPECT_EQ(test::textureRefusal(huge), "texture 'a' is not a readable EXR: it is cut short");
   std::vector<std::string> names{"R", "G", "B"};
   for (int i = 0; i < 40; ++i) names.push_back("extra" + std::to_string(i));
   Bytes wide = exrOf(names, false, {}, 16, 16);
@@ -173,7 +173,7 @@ TEST(TextureExr, RefusesWhatAHeaderOnlyClaims) {
   // An attribute that claims 1 GB.
   const std::size_t size = text.find("compression", 8) + 12 + 12;
   bytes[size + 3] = 0x40;
-  EXPECT_EQ(test::textureRefusal(bytes), "texture 'a' is no readable EXR: it is cut short");
+  EXPECT_EQ(test::textureRefusal(bytes), "texture 'a' is not a readable EXR: it is cut short");
 }
 
 }  // namespace

@@ -185,7 +185,8 @@ TEST(TextureJpeg, RefusesWhatIsDamagedOrCutShort) {
   for (std::size_t size = 3; size + 2 < bytes.size(); ++size) {
     const std::string message =
         test::textureRefusal({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)});
-    ASSERT_THAT(message, HasSubstr("texture 'a' is no readable JPEG: it is damaged or ")) << size;
+    ASSERT_THAT(message, HasSubstr("texture 'a' is not a readable JPEG: it is damaged or "))
+        << size;
   }
   test::expectSpoiltImagesAreReadOrRefused(bytes);
   test::expectSpoiltImagesAreReadOrRefused(jpegOf(pattern(24, 20, 4), TJSAMP_444));

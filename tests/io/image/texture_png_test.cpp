@@ -217,20 +217,20 @@ TEST(TexturePng, RefusesWhatIsDamaged) {
   test::expectSpoiltImagesAreReadOrRefused(
       pngOf(pattern(7, 6, 4, 16), true, {.icc_profile = test::swappedProfile(1.8)}));
   EXPECT_THAT(test::textureRefusal({bytes.begin(), bytes.end() - 20}),
-              HasSubstr("texture 'a' is no readable PNG: it is cut short"));
+              HasSubstr("texture 'a' is not a readable PNG: it is cut short"));
 }
 
 TEST(TexturePng, RefusesPixelsThatCannotBeInTheFile) {
   const Bytes few = deflated(Bytes(4000));
   EXPECT_EQ(test::textureRefusal(pngOfChunks(4096, 4096, 8, 2, {{"IDAT", few}})),
-            "texture 'a' is no readable PNG: it is cut short");
+            "texture 'a' is not a readable PNG: it is cut short");
   EXPECT_THAT(test::textureRefusal(pngOfChunks(16000, 16000, 8, 2, {{"IDAT", few}})),
               HasSubstr("texture 'a' has 16000 x 16000 pixels in "));
   EXPECT_EQ(test::textureRefusal(pngOfChunks(100000, 100000, 8, 2, {{"IDAT", few}})),
             "texture 'a' has 100000 x 100000 pixels; at most 268435456 are read; scale it down");
   EXPECT_EQ(test::textureRefusal(
                 pngOfChunks(8, 1, 8, 0, {{"IDAT", deflated(Bytes(std::size_t{64} << 20))}})),
-            "texture 'a' is no readable PNG: it holds more than its pixels");
+            "texture 'a' is not a readable PNG: it holds more than its pixels");
 }
 
 }  // namespace

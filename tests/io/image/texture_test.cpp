@@ -79,9 +79,10 @@ TEST(Texture, RefusesWhatIsNoImage) {
   EXPECT_THAT([] { decodeTexture("", "texture 'a'"); },
               ThrowsMessage<DataError>("texture 'a' is empty; save it again"));
   for (const char* text : {"x", "RIFF1234WAVEfmt ", "solid cube", "<html>", "P6 1 1 255"}) {
-    EXPECT_THAT([&] { decodeTexture(text, "texture 'a'"); },
-                ThrowsMessage<DataError>("texture 'a' is no image of a kind that is read; save it "
-                                         "as PNG, JPEG, WebP, TIFF or OpenEXR"));
+    EXPECT_THAT(
+        [&] { decodeTexture(text, "texture 'a'"); },
+        ThrowsMessage<DataError>("texture 'a' is not an image in a format that is read; save it "
+                                 "as PNG, JPEG, WebP, TIFF or OpenEXR"));
   }
 }
 

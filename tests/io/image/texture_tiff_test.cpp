@@ -307,7 +307,7 @@ TEST(TextureTiff, RefusesWhatIsDamagedOrOfOtherKinds) {
     test::expectPrefixesAreRefused(bytes, true);
     test::expectSpoiltImagesAreReadOrRefused(bytes);
     EXPECT_EQ(test::textureRefusal({bytes.begin(), bytes.begin() + 200}),
-              "texture 'a' is no readable TIFF: it is damaged or cut short; save it again");
+              "texture 'a' is not a readable TIFF: it is damaged or cut short; save it again");
   }
   test::expectSpoiltImagesAreReadOrRefused(
       tiffOf(pattern(19, 11, 4, 16), {.packing = COMPRESSION_ADOBE_DEFLATE,

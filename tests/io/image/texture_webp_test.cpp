@@ -124,7 +124,7 @@ TEST(TextureWebp, RefusesAnimationsAndDamage) {
   test::expectSpoiltImagesAreReadOrRefused(bytes);
   test::expectSpoiltImagesAreReadOrRefused(webpOf(pattern(19, 11, 4), true));
   EXPECT_THAT(test::textureRefusal({bytes.begin(), bytes.end() - 20}),
-              HasSubstr("texture 'a' is no readable WebP: it is damaged"));
+              HasSubstr("texture 'a' is not a readable WebP: it is damaged"));
 }
 
 TEST(TextureWebp, RefusesLargeImagesOfOneColour) {

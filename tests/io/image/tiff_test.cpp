@@ -56,11 +56,11 @@ TEST(Tiff, RefusesWhatItCannotReadOrWrite) {
   auto bytes = encodeTiff(test::spanImage(37, 70, stripes), {palette, 1, 1});
   const std::vector<std::uint8_t> text = {'n', 'o', 'n', 'e'};
   EXPECT_THAT([&] { decodeTiff(text); },
-              ThrowsMessage<DataError>(HasSubstr("is no readable TIFF: ")));
+              ThrowsMessage<DataError>(HasSubstr("is not a readable TIFF: ")));
   for (const std::size_t size : {100, 50, 8, 7, 0}) {
     bytes.resize(size);
     EXPECT_THAT([&] { decodeTiff(bytes); },
-                ThrowsMessage<DataError>(HasSubstr("is no readable TIFF: ")));
+                ThrowsMessage<DataError>(HasSubstr("is not a readable TIFF: ")));
   }
   EXPECT_THAT(
       [&] {

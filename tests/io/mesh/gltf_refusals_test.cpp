@@ -28,19 +28,19 @@ std::string refusalAfter(const Change& change) {
 }
 
 TEST(GltfRefusals, OtherVersionsAndOtherJson) {
-  EXPECT_THAT(refusal("{}"), HasSubstr("'part': a JSON text without 'asset', which is no glTF"));
+  EXPECT_THAT(refusal("{}"), HasSubstr("'part': a JSON text without 'asset', which is not glTF"));
   EXPECT_THAT(refusal("{}", "part.obj"), HasSubstr("glTF"));
   EXPECT_EQ(refusalAfter([](Json& json) { json["asset"]["version"] = "1.0"; }),
             "'part': a glTF of version '1.0'; export glTF 2.0");
   EXPECT_EQ(refusalAfter([](Json& json) { json["asset"]["minVersion"] = "3\n"; }),
             "'part': a glTF of version '3?'; export glTF 2.0");
-  EXPECT_EQ(refusal("[]", "part.gltf"), "'part.gltf': the JSON text is no object" + again);
+  EXPECT_EQ(refusal("[]", "part.gltf"), "'part.gltf': the JSON text must be an object" + again);
   EXPECT_EQ(refusal("{\"asset\": 1,}"),
-            "'part', byte 12: here the text is no JSON; export or download the file again");
+            "'part', byte 12: here the text is not JSON; export or download the file again");
   EXPECT_EQ(refusal("{\"asset\": 1e999}"),
             "'part', byte 14: here a number is too large; export the file again");
   EXPECT_EQ(refusal("{\"asset\": {\"version\": \"\xFF\"}}"),
-            "'part', byte 23: here the text is no JSON; export or download the file again");
+            "'part', byte 23: here the text is not JSON; export or download the file again");
 }
 
 TEST(GltfRefusals, ExtensionsThatItNeedsByName) {
@@ -94,7 +94,7 @@ TEST(GltfRefusals, MoreValuesThanMemoryShouldHold) {
 TEST(GltfRefusals, NumbersThatAreNoCounts) {
   for (const Json& count : {Json(-1), Json(1.5), Json(1e300), Json("3"), Json(nullptr)}) {
     EXPECT_EQ(refusalAfter([&](Json& json) { json["accessors"][0]["count"] = count; }),
-              "'part': accessors[0].count is no count" + again);
+              "'part': accessors[0].count must be a whole number from 0 on" + again);
   }
   EXPECT_EQ(refusalAfter([&](Json& json) { json["accessors"][0].erase("count"); }),
             "'part': accessors[0].count is missing" + again);
@@ -111,13 +111,13 @@ TEST(GltfRefusals, AccessorsOutOfRange) {
   EXPECT_EQ(with("count", std::uint64_t{1} << 53),
             "'part': accessors[0].count is more than 4294967295" + again);
   EXPECT_EQ(with("count", std::uint64_t{1} << 60),
-            "'part': accessors[0].count is no count" + again);
+            "'part': accessors[0].count must be a whole number from 0 on" + again);
   EXPECT_EQ(with("count", 4294967295), beyond);
   EXPECT_EQ(with("bufferView", 1), "'part': bufferViews[1] is named, but there are 1" + again);
   EXPECT_EQ(with("componentType", 5124),
-            "'part': accessors[0].componentType is no type of components" + again);
+            "'part': accessors[0].componentType is not a component type" + again);
   EXPECT_EQ(refusalAfter([](Json& json) { json["accessors"][0]["type"] = "MAT4"; }),
-            "'part': accessors[0].type is no type of vertex data" + again);
+            "'part': accessors[0].type must be SCALAR, VEC2, VEC3 or VEC4" + again);
   EXPECT_EQ(refusalAfter([](Json& json) { json["bufferViews"][0]["byteStride"] = 1ULL << 53; }),
             beyond);
 }
@@ -197,7 +197,7 @@ TEST(GltfRefusals, PrimitivesOfNoShape) {
     return refusalAfter([&](Json& json) { json["meshes"][0]["primitives"][0][key] = value; });
   };
   EXPECT_EQ(with("mode", 7),
-            "'part': meshes[0].primitives[0].mode is no mode of primitives" + again);
+            "'part': meshes[0].primitives[0].mode must be a whole number from 0 to 6" + again);
   EXPECT_EQ(with("attributes", Json::object()),
             "'part': meshes[0].primitives[0].attributes.POSITION is missing" + again);
   EXPECT_EQ(

@@ -83,7 +83,7 @@ TEST(Gltf, ReadsBuffersBesideItWithinItsFolder) {
             "buffer '../outside.bin' lies outside of the folder of the mesh; move it there");
   std::filesystem::remove(scratch / "../outside.bin");
   const std::string elsewhere =
-      " is no file in the folder of the mesh; put it there and name it "
+      " is not a file in the folder of the mesh; put it there and name it "
       "by a relative path";
   EXPECT_EQ(refusalOf("http://a.de/b.bin"), "buffer 'http://a.de/b.bin'" + elsewhere);
   EXPECT_EQ(refusalOf("file:///etc/passwd"), "buffer 'file:///etc/passwd'" + elsewhere);

@@ -242,7 +242,8 @@ TEST_F(ObjColoursTest, RefusesTexturesThatItCannotRead) {
   EXPECT_THAT(refused(obj), HasSubstr("texture '../tex2.png' lies outside of the folder"));
   scratch_.write("broken.png", "\x89PNG\r\n\x1A\n");
   writeLibrary("newmtl a\nmap_Kd broken.png\n");
-  EXPECT_THAT(refused(obj), HasSubstr("texture 'broken.png' is no readable PNG: it is cut short"));
+  EXPECT_THAT(refused(obj),
+              HasSubstr("texture 'broken.png' is not a readable PNG: it is cut short"));
   writeLibrary("newmtl a\nmap_Kd a\x01\x1B.png\n");
   EXPECT_THAT(refused(obj), HasSubstr("texture 'a??.png': the name contains the unprintable"));
   // A material that no triangle has may name anything.

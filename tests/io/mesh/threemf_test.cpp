@@ -318,11 +318,11 @@ TEST(Threemf, RefusesPropertiesOutOfRange) {
 
 TEST(Threemf, RefusesColoursThatAreNone) {
   for (const std::string text : {"red", "#12345", "#1234567", "#12345G", "#123456789", ""}) {
-    EXPECT_THAT(
-        colourRefusal(
-            oneObject(threemfCorner(), "",
-                      "<m:colorgroup id=\"6\"><m:color color=\"" + text + "\"/></m:colorgroup>")),
-        HasSubstr("color: its color '" + text + "' is no colour; #RRGGBB and #RRGGBBAA are read"));
+    EXPECT_THAT(colourRefusal(oneObject(
+                    threemfCorner(), "",
+                    "<m:colorgroup id=\"6\"><m:color color=\"" + text + "\"/></m:colorgroup>")),
+                HasSubstr("color: its color '" + text +
+                          "' is not a colour; #RRGGBB and #RRGGBBAA are read"));
   }
 }
 
@@ -448,7 +448,7 @@ TEST(Threemf, RefusesDocumentTypesAndBrokenXml) {
               HasSubstr("ends before its last element: it is cut off"));
   EXPECT_THAT(refusal(threemfOf("<a/>")),
               HasSubstr("begins with 'a', not with the model of a 3MF file"));
-  EXPECT_THAT(refusal(threemfOf("no XML")), HasSubstr("is no well-formed XML; export it again"));
+  EXPECT_THAT(refusal(threemfOf("no XML")), HasSubstr("is not well-formed XML; export it again"));
   EXPECT_THAT(refusal(threemfOf("<a><b></a></b>")), testing::Not("read"));
   EXPECT_THAT(refusal(threemfOf("<?xml version=\"1.0\" encoding=\"KOI8-R\"?><a/>")),
               HasSubstr("is in an encoding that is not read; use UTF-8"));

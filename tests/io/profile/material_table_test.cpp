@@ -70,7 +70,7 @@ TEST(MaterialTable, ColoursAreHexadecimalOrDecimal) {
         "a=1,2,3,", "a=-1,2,3", "a=#gg0000", "a=1, 2,3"}) {
     EXPECT_THAT([&] { parseMaterial(text, {}); },
                 ThrowsMessage<UsageError>("'" + std::string(text).substr(2) +
-                                          "' is no colour; give #rrggbb or r,g,b of 0 to 255"))
+                                          "' is not a colour; give #rrggbb or r,g,b of 0 to 255"))
         << text;
   }
 }
