@@ -25,12 +25,14 @@ constexpr std::array<Choice<Kind>, 4> kinds{
      {Kind::bayer, "bayer", "Ordered dither, after Bayer"},
      {Kind::gradient_noise, "gradient-noise", "Perlin's gradient noise"}}};
 
-constexpr std::array<Choice<MaskKernel::Shape>, 3> kernels{
+constexpr std::array<Choice<MaskKernel::Shape>, 4> kernels{
     {{MaskKernel::Shape::peters, "peters",
       "A Gaussian, filtered on the discrete Fourier transform"},
      {MaskKernel::Shape::gauss, "gauss", "A sampled Gaussian"},
      {MaskKernel::Shape::axis_mix, "axis-mix",
-      "A Gaussian in space and one in each lattice plane, mixed"}}};
+      "A Gaussian in space and one in each lattice plane, mixed"},
+     {MaskKernel::Shape::exponential, "exponential",
+      "An exponential of the distance in space and in each lattice plane, mixed"}}};
 
 /// The ranks of a Bayer (ordered) mask whose edges are powers of two, x fastest: the bits of the
 /// exclusive or of the coordinates, the lowest first, decide most.
@@ -62,12 +64,12 @@ class Mask : public Source {
     options.choice("kind", kind_, kinds, "How the thresholds are ordered");
     options.choice("kernel", kernel_, kernels, "Kernel of void-and-cluster");
     options.triple("sigma", sigma_, "S|SX,SY,SZ", {0.3, 16},
-                   "Standard deviation of the Gaussian of void-and-cluster along x, y and z, in "
-                   "voxels");
+                   "Standard deviation of the Gaussian of void-and-cluster, or length of decay of "
+                   "exponential, along x, y and z, in voxels");
     options.number("plane-sigma", plane_sigma_, {0.3, 16},
                    "Standard deviation in the lattice planes of axis-mix, in voxels");
     options.number("space-weight", space_weight_, {0, 1e6},
-                   "Weight of the Gaussian in space of axis-mix");
+                   "Weight of space in axis-mix and exponential");
     options.integer("cell", cell_, {2, 128}, "Edge of the cells of gradient-noise, in voxels");
     options.integer("seed", seed_, {0, std::numeric_limits<int>::max()},
                     "Seed of the random start");

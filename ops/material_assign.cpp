@@ -4,13 +4,13 @@
 #include <sstream>
 
 #include <openvdb/tree/LeafManager.h>
-#include <openvdb/tree/NodeManager.h>
 
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
+#include "ops/kernels/leaf/split_tiles.h"
 #include "ops/kernels/printing/depth_bands.h"
-#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/known_grids.h"
@@ -21,49 +21,9 @@ namespace vdbdither {
 namespace {
 
 using openvdb::BoolGrid;
-using openvdb::BoolTree;
 using openvdb::Coord;
-using openvdb::CoordBBox;
 using openvdb::Int32Grid;
 using openvdb::Int32Tree;
-
-/// The entries of a list; commas between the numbers of a colour do not part them.
-std::vector<std::string> entriesOf(const std::string& text) {
-  std::vector<std::string> entries;
-  for (const std::string& part : commaList(text)) {
-    const bool number = !part.empty() && std::all_of(part.begin(), part.end(),
-                                                     [](char c) { return c >= '0' && c <= '9'; });
-    if (number && !entries.empty() && entries.back().find('=') != std::string::npos) {
-      entries.back() += "," + part;
-    } else {
-      entries.push_back(part);
-    }
-  }
-  return entries;
-}
-
-/// Sets every active voxel of a copied topology to 1. OpenVDB's own copy with two values tests each
-/// voxel of each leaf.
-struct ActivesToOne {
-  template <typename Node>
-  void operator()(Node& node) const {
-    for (auto value = node.beginValueOn(); value; ++value) value.setValue(1);
-  }
-  void operator()(Int32Tree::LeafNodeType& leaf) const {
-    std::int32_t* values = leaf.buffer().data();
-    for (openvdb::Index x = 0; x < 8; ++x) {
-      const std::uint64_t word = leaf.getValueMask().getWord<std::uint64_t>(x);
-      for (unsigned n = 0; n < 64; ++n) *values++ = static_cast<std::int32_t>(word >> n & 1U);
-    }
-  }
-};
-
-Int32Tree::Ptr onesWhereActive(const BoolTree& solid) {
-  auto ones = std::make_shared<Int32Tree>(solid, 0, openvdb::TopologyCopy());
-  openvdb::tree::NodeManager<Int32Tree> nodes(*ones);
-  nodes.foreachTopDown(ActivesToOne());
-  return ones;
-}
 
 /// `material` from `solid`.
 class MaterialAssign : public Filter {
@@ -72,7 +32,8 @@ class MaterialAssign : public Filter {
     options.text(
         "material", material_, "NAME",
         "One material for all voxels: a name of the printer's profile, or NAME=#rrggbb; by "
-        "default the first of the profile, or else white");
+        "default those of the colours, as halftone chooses them, where there are colours and a "
+        "profile, or else the first of the profile, or white");
     options.text("parts", parts_, "NAME,...",
                  "A material for each part, in the order of the meshes");
     options.text("shell", shell_, "LENGTH:NAME,...",
@@ -90,6 +51,11 @@ class MaterialAssign : public Filter {
     if (!shell_.empty() + !parts_.empty() + !material_.empty() > 1) {
       throw UsageError("--material, --parts and --shell exclude each other; give one");
     }
+    if (material_.empty() && parts_.empty() && shell_.empty() && in.grids.contains(colour_grid) &&
+        in.metadata.contains(printer_key)) {
+      colours_ = halftone();
+      return colours_->plan(in);
+    }
     if (!parts_.empty()) findGrid<Int32Grid>(in.grids, part_grid);
     planTable(in);
 
@@ -103,25 +69,32 @@ class MaterialAssign : public Filter {
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
+    if (colours_) return colours_->reads();
     std::vector<Read> reads = {
         {solid_grid, Reach::stencil(depthReach(bands_, lattice_.pitch_mm.z()))}};
     if (!parts_.empty()) reads.push_back({part_grid, Reach::point()});
     return reads;
   }
 
+  [[nodiscard]] double memoryBytes() const override {
+    return colours_ ? colours_->memoryBytes() : 0;
+  }
+
   [[nodiscard]] std::optional<Work> work() const override {
+    if (colours_) return colours_->work();
     return Work{.us_per_surface_leaf =
                     bands_.empty() ? cost::material_us : cost::material_shell_us};
   }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
+    if (colours_) return colours_->run(in);
     const auto solid = findGrid<BoolGrid>(in.grids, solid_grid);
     Int32Grid::Ptr material;
     if (!bands_.empty()) {
       material = valueByDepth(*solid, lattice_.pitch_mm, lattice_.box, in.core, in.valid, bands_,
                               static_cast<std::int32_t>(table_.size()));
     } else {
-      material = Int32Grid::create(onesWhereActive(solid->tree()));
+      material = Int32Grid::create(valueWhereActive(solid->tree(), 1));
       material->setTransform(solid->transform().copy());
       if (!parts_.empty())
         takeParts(material->tree(), findGrid<Int32Grid>(in.grids, part_grid)->tree());
@@ -131,6 +104,13 @@ class MaterialAssign : public Filter {
   }
 
  private:
+  /// The operator that chooses materials for colours, with the defaults of its options.
+  [[nodiscard]] std::unique_ptr<Filter> halftone() const {
+    std::unique_ptr<Operator> made = findOperator("halftone").make();
+    made->setReporter(&report());
+    return std::unique_ptr<Filter>(&dynamic_cast<Filter&>(*made.release()));
+  }
+
   void planTable(const Schema& in) {
     std::vector<Material> known;
     if (const auto printer = in.metadata.find(printer_key); printer != in.metadata.end()) {
@@ -139,10 +119,10 @@ class MaterialAssign : public Filter {
     table_.clear();
     bands_.clear();
     if (!parts_.empty()) {
-      for (const std::string& name : entriesOf(parts_)) add("--parts", name, known);
+      for (const std::string& name : materialEntries(parts_)) add("--parts", name, known);
     } else if (!shell_.empty()) {
       double depth_mm = 0;
-      for (const std::string& layer : entriesOf(shell_)) {
+      for (const std::string& layer : materialEntries(shell_)) {
         const std::size_t colon = layer.find(':');
         if (colon == std::string::npos) {
           throw UsageError("--shell: '" + layer +
@@ -191,7 +171,8 @@ class MaterialAssign : public Filter {
       strays += voxels;
       return count;
     };
-    splitTiles(material, part);
+    const openvdb::tree::ValueAccessor<const Int32Tree> nodes(part);
+    splitTiles(material, [&](const Coord& at) { return nodes.probeConstLeaf(at) != nullptr; });
     auto tile = material.beginValueOn();
     tile.setMaxDepth(Int32Tree::ValueOnIter::LEAF_DEPTH - 1);
     for (; tile; ++tile)
@@ -206,36 +187,12 @@ class MaterialAssign : public Filter {
     if (strays > 0) report().count("voxels_of_no_part", static_cast<double>(strays));
   }
 
-  /// Breaks the active tiles of `material` up so that each lies within one tile of `part`, or is a
-  /// leaf.
-  static void splitTiles(Int32Tree& material, const Int32Tree& part) {
-    const Int32Tree& before = material;
-    std::vector<CoordBBox> tiles;
-    auto tile = before.cbeginValueOn();
-    tile.setMaxDepth(Int32Tree::ValueOnCIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile) tiles.push_back(tile.getBoundingBox());
-    const openvdb::tree::ValueAccessor<const Int32Tree> accessor(part);
-    for (const CoordBBox& box : tiles) {
-      for (int x = box.min().x(); x <= box.max().x(); x += leaf_layers) {
-        for (int y = box.min().y(); y <= box.max().y(); y += leaf_layers) {
-          for (int z = box.min().z(); z <= box.max().z(); z += leaf_layers) {
-            const Coord at(x, y, z);
-            if (accessor.probeConstLeaf(at)) {
-              material.touchLeaf(at);
-            } else if (box.dim().x() > leaf_layers) {
-              material.addTile(1, at, 1, true);
-            }
-          }
-        }
-      }
-    }
-  }
-
   std::string material_;
   std::string parts_;
   std::string shell_;
   std::string core_;
 
+  std::unique_ptr<Filter> colours_;  ///< where colours choose the materials
   Lattice lattice_;
   MaterialTable table_;
   std::vector<DepthBand> bands_;  ///< of the shell; the core is the last of the table

@@ -1,8 +1,13 @@
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "io/profile/ink_set.h"
+#include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
+#include "ops/kernels/colour/empty_colours.h"
+#include "ops/kernels/colour/seen_colours.h"
 #include "ops/kernels/printing/gaussian_spread.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
@@ -24,6 +29,10 @@ class Simulate : public Filter {
         "spread", spread_mm_, "LENGTH|X,Y,Z", {0, 100},
         "Standard deviation of the Gaussian by which a droplet spreads; by default that "
         "of the printer's profile, or else 50um");
+    options.length("translucency", translucency_mm_, {0.001, 10},
+                   "Adds 'Cd', the colours that the print shows: means of the materials around, by "
+                   "a Gaussian of this standard deviation, which is how far light wanders in them",
+                   {"none", "Adds no colours"});
   }
 
   Schema plan(const Schema& in) override {
@@ -31,30 +40,50 @@ class Simulate : public Filter {
     box_ = in.lattice.box;
     if (!spread_mm_) spread_mm_ = usualSpreadMm(in);
     spread_.emplace(in.lattice.pitch_mm, *spread_mm_);
-    constexpr int furthest = 500;
-    const openvdb::Coord reach = spread_->reach();
-    if (std::max({reach.x(), reach.y(), reach.z()}) > furthest)
-      throw UsageError("--spread: the droplets would reach over more than " +
-                       std::to_string(furthest) + " voxels; give a smaller spread");
+    checkReach(*spread_, "--spread: the droplets would reach", "spread");
     Schema out = in;
     out.grids[printed_grid] = makePrintedGrid(solid->transform());
+    if (translucency_mm_) {
+      planColours(in);
+      out.grids[colour_grid] = emptyColours(in.lattice);
+      out.grids.erase(opacity_grid);
+    }
     return out;
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
-    return {{solid_grid, Reach::stencil(spread_->reach().z())}};
+    std::vector<Read> reads{{solid_grid, Reach::stencil(spread_->reach().z())}};
+    if (seen_) reads.push_back({material_grid, Reach::stencil(light_->reach().z())});
+    return reads;
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    return Work{.us_per_surface_leaf = cost::simulate_us};
+    return Work{.us_per_surface_leaf = cost::simulate_us + (seen_ ? cost::simulate_colours_us : 0)};
   }
 
   [[nodiscard]] Grids run(const Slab& in) const override {
-    return {{printed_grid, spread_->run(*findGrid<openvdb::BoolGrid>(in.grids, solid_grid), box_,
-                                        in.core, in.valid)}};
+    const auto printed =
+        spread_->run(*findGrid<openvdb::BoolGrid>(in.grids, solid_grid), box_, in.core, in.valid);
+    Grids out{{printed_grid, printed}};
+    if (seen_) {
+      const auto material = findGrid<openvdb::Int32Grid>(in.grids, material_grid);
+      const auto colours = seen_->run(*material, *printed, in.core, in.valid);
+      colours->setName(colour_grid);
+      out[colour_grid] = colours;
+    }
+    return out;
   }
 
  private:
+  static void checkReach(const GaussianSpread& spread, const std::string& what,
+                         const std::string& remedy) {
+    constexpr int furthest = 500;
+    const openvdb::Coord reach = spread.reach();
+    if (std::max({reach.x(), reach.y(), reach.z()}) > furthest)
+      throw UsageError(what + " over more than " + std::to_string(furthest) +
+                       " voxels; give a smaller " + remedy);
+  }
+
   static Vec3d usualSpreadMm(const Schema& in) {
     constexpr double usual_mm = 0.05;
     const auto profile = in.metadata.find(printer_key);
@@ -63,9 +92,26 @@ class Simulate : public Filter {
     return stated.isZero() ? Vec3d(usual_mm) : stated;
   }
 
+  /// Prepares the colours of the table of materials; measured ones come from the profile.
+  void planColours(const Schema& in) {
+    findGrid<openvdb::Int32Grid>(in.grids, material_grid);
+    const auto table = in.metadata.find(materials_key);
+    if (table == in.metadata.end())
+      throw DataError(
+          "--translucency: no table of materials says what colour 'material' has; make "
+          "it with halftone or material-assign");
+    light_.emplace(in.lattice.pitch_mm, Vec3d(*translucency_mm_));
+    checkReach(*light_, "--translucency: the light would reach", "length");
+    seen_.emplace(std::array{light_->weights(0), light_->weights(1), light_->weights(2)},
+                  linearColoursOf(materialTableFromJson(table->second), in), yuleNielsenOf(in));
+  }
+
   std::optional<Vec3d> spread_mm_;
+  std::optional<double> translucency_mm_;
   openvdb::CoordBBox box_;
   std::optional<GaussianSpread> spread_;
+  std::optional<GaussianSpread> light_;
+  std::optional<SeenColours> seen_;
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/json_text.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/printable.h"
@@ -99,6 +100,20 @@ MaterialTable materialTableFromJson(const std::string& text) {
     table.push_back({printable(name.get<std::string>()), *rgba});
   }
   return table;
+}
+
+std::vector<std::string> materialEntries(const std::string& text) {
+  std::vector<std::string> entries;
+  for (const std::string& part : commaList(text)) {
+    const bool number = !part.empty() && std::all_of(part.begin(), part.end(),
+                                                     [](char c) { return c >= '0' && c <= '9'; });
+    if (number && !entries.empty() && entries.back().find('=') != std::string::npos) {
+      entries.back() += "," + part;
+    } else {
+      entries.push_back(part);
+    }
+  }
+  return entries;
 }
 
 Material parseMaterial(std::string_view text, const std::vector<Material>& known) {

@@ -23,6 +23,10 @@ MaterialTable materialTableFromJson(const std::string& text);
 /// UsageError.
 std::array<std::uint8_t, 4> parseColour(std::string_view text);
 
+/// The entries of a list of materials, which commas part; those between the numbers of a colour do
+/// not.
+std::vector<std::string> materialEntries(const std::string& text);
+
 /// Reads `name`, `name=#rrggbb`, `name=#rrggbbaa`, `name=r,g,b` or `name=r,g,b,a`; names may serve
 /// as file names. A bare name is looked up in `known`, then among the usual inks (white, black,
 /// clear, cyan, magenta, yellow and their Vero names), case aside. Throws UsageError with what

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
@@ -29,7 +30,9 @@ class ProfileParser {
       problems_.emplace_back("the text is not a JSON object");
       return;
     }
-    known(json, {"name", "title", "source", "pitch_mm", "build_mm", "point_spread_mm", "materials"},
+    known(json,
+          {"name", "title", "source", "pitch_mm", "build_mm", "point_spread_mm", "yule_nielsen",
+           "materials"},
           "");
     profile_.name = this->text(json, "name", "");
     if (!json.contains("name")) problems_.emplace_back("there is no name");
@@ -41,6 +44,15 @@ class ProfileParser {
     if (json.contains("build_mm")) profile_.build_mm = lengths(json, "build_mm", 0, 1e5);
     if (json.contains("point_spread_mm"))
       profile_.point_spread_mm = lengths(json, "point_spread_mm", 0, 10);
+    if (json.contains("yule_nielsen")) {
+      ordered_json factors = json["yule_nielsen"];
+      if (factors.is_number()) factors = {factors, factors, factors};
+      constexpr double most = 16;
+      const auto triple = numbers(factors, 1, most);
+      if (!triple)
+        problems_.emplace_back("yule_nielsen must be a number from 1 to 16, or three of them");
+      profile_.yule_nielsen = triple.value_or(profile_.yule_nielsen);
+    }
     const ordered_json materials = json.value("materials", ordered_json::array());
     if (!materials.is_array()) problems_.emplace_back("materials is no list");
     for (const ordered_json& entry : materials) material(entry);
@@ -94,6 +106,19 @@ class ProfileParser {
     return result;
   }
 
+  /// Three numbers within a range.
+  static std::optional<openvdb::Vec3d> numbers(const ordered_json& json, double least,
+                                               double most) {
+    openvdb::Vec3d result(0.0);
+    if (!json.is_array() || json.size() != 3) return std::nullopt;
+    for (int channel = 0; channel < 3; ++channel) {
+      const ordered_json& value = json[channel];
+      if (!value.is_number() || value < least || value > most) return std::nullopt;
+      result[channel] = value;
+    }
+    return result;
+  }
+
   void material(const ordered_json& entry) {
     const std::string where = "material " + std::to_string(profile_.materials.size() + 1) + ": ";
     Material& material = profile_.materials.emplace_back();
@@ -101,7 +126,7 @@ class ProfileParser {
       problems_.push_back(where + "it is not a JSON object");
       return;
     }
-    known(entry, {"name", "rgba"}, where);
+    known(entry, {"name", "rgba", "linear_rgb"}, where);
     material.name = text(entry, "name", where);
     if (material.name.empty()) problems_.push_back(where + "there is no name");
     if (const auto problem = fileNameProblem(material.name); problem && !material.name.empty())
@@ -113,6 +138,11 @@ class ProfileParser {
       if (proper) material.rgba[channel] = rgba[channel];
     }
     if (!proper) problems_.push_back(where + "rgba must be four whole numbers from 0 to 255");
+    if (entry.contains("linear_rgb")) {
+      material.linear_rgb = numbers(entry["linear_rgb"], 0, 1);
+      if (!material.linear_rgb)
+        problems_.push_back(where + "linear_rgb must be three numbers from 0 to 1");
+    }
     for (auto other = profile_.materials.begin(); &*other != &material; ++other) {
       if (other->name == material.name)
         problems_.push_back(where + "'" + material.name + "' is there twice");
@@ -182,9 +212,16 @@ std::string toJson(const PrinterProfile& profile) {
     json["point_spread_mm"] = {profile.point_spread_mm[0], profile.point_spread_mm[1],
                                profile.point_spread_mm[2]};
   }
+  if (profile.yule_nielsen != PrinterProfile().yule_nielsen) {
+    json["yule_nielsen"] = {profile.yule_nielsen[0], profile.yule_nielsen[1],
+                            profile.yule_nielsen[2]};
+  }
   json["materials"] = ordered_json::array();
   for (const Material& material : profile.materials) {
-    json["materials"].push_back({{"name", material.name}, {"rgba", material.rgba}});
+    ordered_json& entry = json["materials"].emplace_back(
+        ordered_json{{"name", material.name}, {"rgba", material.rgba}});
+    if (const auto& colour = material.linear_rgb)
+      entry["linear_rgb"] = {(*colour)[0], (*colour)[1], (*colour)[2]};
   }
   return jsonText(json);
 }

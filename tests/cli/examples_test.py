@@ -19,17 +19,18 @@ class Examples(ProgramTest):
         self.assertGreater(len(links), 5)
         for link in links:
             with self.subTest(operator=link.name):
-                # Each example runs in a folder that contains only a part.
+                # Each example runs in a folder that contains only a part, and the same with colours.
                 self.doCleanups()
                 super().setUp()
                 meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
+                meshes.write_coloured(self.folder / "part.ply", meshes.sphere(0.8))
                 help_text = self.succeed("help", link.name).decode()
                 example = help_text.split("Example:\n")[1].strip()
                 for line in example.splitlines():
                     self.assertTrue(line.strip().startswith("vdbdither "), example)
                     self.assertRegex(self.shell(f"{line} --explain").decode(), r"(?m)^time +about \d", line)
                     self.shell(line)
-                self.assertGreater(len(self.listing()), 1, "no output")
+                self.assertGreater(len(self.listing()), 2, "no output")
 
 
 class Documents(ProgramTest):
@@ -52,6 +53,7 @@ class Documents(ProgramTest):
                     meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
                     meshes.write_stl(self.folder / "lid.stl", meshes.box((0.6, 0.6, 0.4), (-0.3, -0.3, 0.9)))
                     meshes.write_textured(self.folder / "part.obj", meshes.sphere(0.8))
+                    meshes.write_coloured(self.folder / "part.ply", meshes.sphere(0.8))
                     Image.linear_gradient("L").convert("RGB").save(self.folder / "texture.png")
                     for line in lines:
                         # Several lines of a block can write the same stack.

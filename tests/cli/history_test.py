@@ -46,7 +46,7 @@ class History(ProgramTest):
                          "^--preset best --mask blue --amplitude adapted --at voxel --guard walls --spread 0.05mm --seed 1 "
                          "--mask-digest [0-9a-f]{16}$")
         self.assertEqual(self.arguments("x.vdb", "material-assign"), "--material white")
-        self.assertEqual(self.arguments("x.vdb", "simulate"), "--spread 0.05mm,0.05mm,0.05mm")
+        self.assertEqual(self.arguments("x.vdb", "simulate"), "--spread 0.05mm,0.05mm,0.05mm --translucency none")
         self.assert_runs_again("x.vdb")
 
     def test_a_preset_is_recorded_as_what_it_stands_for(self):

@@ -33,6 +33,7 @@ RUNS = {
     "compare": lambda radius: ("compare", f"solid{radius}.vdb", f"solid{radius}.vdb"),
     "csg": lambda radius: ("csg", "-i", f"surface{radius}.vdb", "--union", f"surface{radius}.vdb", "-o", "out.vdb"),
     "dither": lambda radius: ("dither", "-i", f"surface{radius}.vdb", "-o", "out.vdb"),
+    "halftone": lambda radius: ("halftone", "-i", f"coloured{radius}.vdb", "-o", "out.vdb"),
     "hollow": lambda radius: (*surface(radius), "--band", "0.2mm", "!", "hollow", "--thickness", "0.1mm", "-o", "out.vdb"),
     "info": lambda radius: ("info", f"solid{radius}.vdb"),
     "interlace": lambda radius: ("interlace", "-i", f"surface{radius}.vdb", "-o", "out.vdb"),
@@ -47,6 +48,7 @@ RUNS = {
     "read": lambda radius: ("read", f"surface{radius}.vdb", "-o", "out.vdb"),
     "render": lambda radius: ("render", "part8.stl", "out.png", "--samples", 16 * radius),
     "resample": lambda radius: ("resample", f"surface{radius}.vdb", *MIMAKI, "-o", "out.vdb"),
+    "separate": lambda radius: ("separate", "-i", f"coloured{radius}.vdb", "-o", "out.vdb"),
     "simulate": lambda radius: ("simulate", "-i", f"solid{radius}.vdb", "-o", "out.vdb"),
     "slice-export": sink("slice-export", "out"),
     "slice-import": lambda radius: ("slice-import", f"stack{radius}", "-o", "out.vdb"),
@@ -83,6 +85,9 @@ class Stopped(ProgramTest):
         elif kind == "solid":
             self.make(f"part{radius}.stl")
             self.succeed(*surface(radius), "!", "dither", "-o", name)
+        elif kind == "coloured":
+            meshes.write_coloured(self.folder / f"part{radius}.ply", meshes.sphere(radius, 60))
+            self.succeed("mesh2sdf", f"part{radius}.ply", *MIMAKI, "--colour", "--colour-depth", "0.2mm", "!", "dither", "-o", name)
         elif kind == "stack":
             self.make(f"solid{radius}.vdb")
             self.succeed("slice-export", "-i", f"solid{radius}.vdb", name)
@@ -97,7 +102,7 @@ class Stopped(ProgramTest):
         for radius in self.RADII:
             arguments = tuple(map(str, RUNS[verb](radius)))
             for name in (f"{kind}{radius}{ending}" for kind, ending in (
-                    ("part", ".stl"), ("surface", ".vdb"), ("solid", ".vdb"), ("stack", ""), ("picture", ".png"))):
+                    ("part", ".stl"), ("surface", ".vdb"), ("solid", ".vdb"), ("coloured", ".vdb"), ("stack", ""), ("picture", ".png"))):
                 if name in arguments:
                     self.make(name)
             before = self.listing()
@@ -134,7 +139,7 @@ class Stopped(ProgramTest):
         self.stop_all(("mask", "mesh2sdf", "read", "resample", "slice-import"))
 
     def test_filters_can_be_stopped(self):
-        self.stop_all(("csg", "dither", "hollow", "interlace", "material-assign", "normals", "offset", "simulate"))
+        self.stop_all(("csg", "dither", "halftone", "hollow", "interlace", "material-assign", "normals", "offset", "separate", "simulate"))
 
     def test_sinks_and_tools_can_be_stopped(self):
         self.stop_all(("compare", "info", "mask-spectrum", "measure", "mesh-export", "render", "slice-export", "ssim", "stats", "write"))

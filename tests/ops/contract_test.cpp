@@ -41,6 +41,23 @@ std::string runChain(std::vector<Step> steps, const std::vector<std::string>& mo
   return listener.printed;
 }
 
+/// The mesh as a text PLY with a colour at every vertex.
+std::string colouredPly(const Mesh& mesh) {
+  std::ostringstream text;
+  text << "ply\nformat ascii 1.0\nelement vertex " << mesh.vertices.size()
+       << "\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty "
+          "uchar green\nproperty uchar blue\nelement face "
+       << mesh.triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
+    const auto& vertex = mesh.vertices[n];
+    text << vertex[0] << ' ' << vertex[1] << ' ' << vertex[2] << ' ' << n % 256 << ' '
+         << n * 3 % 256 << ' ' << n * 5 % 256 << '\n';
+  }
+  for (const Mesh::Triangle& triangle : mesh.triangles)
+    text << "3 " << triangle[0] << ' ' << triangle[1] << ' ' << triangle[2] << '\n';
+  return text.str();
+}
+
 /// Every registered operator by its example, in a folder with a part.
 class Contract : public testing::TestWithParam<const OperatorInfo*> {
  protected:
@@ -59,6 +76,7 @@ class Contract : public testing::TestWithParam<const OperatorInfo*> {
     const Mesh part =
         test::transformed(test::torusMesh({0, 0, 0}, 0.7, 0.3, 40), {20, 35, 0}, {0.11, 0.2, 0.3});
     scratch_.write(name + "/part.stl", test::binaryStl(part));
+    scratch_.write(name + "/part.ply", colouredPly(part));
     return folder;
   }
 
@@ -89,7 +107,7 @@ TEST_P(Contract, ItsExampleNamesItAndRuns) {
                           [](const Step& step) { return step.verb == GetParam()->name; }));
   const fs::path folder = enter("example");
   runExample();
-  EXPECT_GT(test::filesUnder(folder).size(), 1U);
+  EXPECT_GT(test::filesUnder(folder).size(), 2U);
 }
 
 TEST_P(Contract, ItsWordsAreOfOneStyle) {

@@ -1,7 +1,11 @@
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
+#include "tests/support/contract.h"
 #include "tests/support/filters.h"
 #include "vdbdither/model/errors.h"
 
@@ -82,6 +86,59 @@ TEST(Simulate, RefusesWhatItCannotDo) {
                                         "voxels; give a smaller spread"));
   EXPECT_THAT([] { test::filterCalled("simulate")->plan(test::schemaOf(mimaki, {})); },
               ThrowsMessage<DataError>("no grid 'solid'; there is none"));
+}
+
+Schema blockOfTwoMaterials() {
+  Schema in = block();
+  const auto solid = openvdb::gridConstPtrCast<BoolGrid>(in.grids.at("solid"));
+  const auto material = openvdb::Int32Grid::create(0);
+  material->setName("material");
+  material->setTransform(solid->transform().copy());
+  for (auto voxel = solid->cbeginValueOn(); voxel; ++voxel) {
+    const CoordBBox filled = voxel.getBoundingBox();
+    for (auto ijk = filled.begin(); ijk; ++ijk)
+      material->tree().setValue(*ijk, (*ijk).x() < 15 ? 1 : 2);
+  }
+  in.grids["material"] = material;
+  in.metadata["vdbdither:materials"] =
+      toJson(MaterialTable{{"white", {255, 255, 255, 255}}, {"black", {0, 0, 0, 255}}});
+  return in;
+}
+
+TEST(Simulate, ShowsTheColoursOfTheMaterialsBlurred) {
+  const auto simulate = test::filterCalled("simulate", {"--translucency", "50um"});
+  const Grids out = test::runWhole(*simulate, blockOfTwoMaterials());
+  const auto colours = openvdb::gridConstPtrCast<openvdb::Vec3SGrid>(out.at("Cd"));
+  EXPECT_EQ(colours->getName(), "Cd");
+  EXPECT_EQ(colours->getVectorType(), openvdb::VEC_INVARIANT);
+  const auto shown = [&](int x) { return colours->tree().getValue(Coord(x, 8, 45))[1]; };
+  EXPECT_NEAR(shown(2), 1, 1e-3);
+  EXPECT_NEAR(shown(28), 0, 1e-3);
+  // Half of each, by the law of Yule and Nielsen with n = 2, lies between the two in the middle.
+  EXPECT_GT(shown(14), 0.25F);
+  EXPECT_LT(shown(15), 0.25F);
+  EXPECT_NEAR((std::sqrt(shown(14)) + std::sqrt(shown(15))) / 2, 0.5, 1e-3);
+}
+
+TEST(Simulate, ColoursDoNotDependOnSlabs) {
+  const auto simulate = test::filterCalled("simulate", {"--translucency", "50um"});
+  const Schema in = blockOfTwoMaterials();
+  EXPECT_EQ(test::firstBreach(*simulate, simulate->plan(in), in.grids, 8), "");
+}
+
+TEST(Simulate, RefusesColoursThatItDoesNotKnow) {
+  const auto plan = [](const std::string& length, const Schema& in) {
+    return [=] { test::filterCalled("simulate", {"--translucency", length})->plan(in); };
+  };
+  EXPECT_THAT(plan("50um", block()), ThrowsMessage<DataError>(HasSubstr("no grid 'material'")));
+  Schema in = blockOfTwoMaterials();
+  EXPECT_THAT(plan("10mm", in),
+              ThrowsMessage<UsageError>("--translucency: the light would reach over more than 500 "
+                                        "voxels; give a smaller length"));
+  in.metadata.erase("vdbdither:materials");
+  EXPECT_THAT(plan("50um", in),
+              ThrowsMessage<DataError>("--translucency: no table of materials says what colour "
+                                       "'material' has; make it with halftone or material-assign"));
 }
 
 }  // namespace

@@ -73,3 +73,17 @@ def write_textured(path, triangles):
     lines += [f"vt {(x - low[0]) / size[0]} {(z - low[1]) / size[1]}" for x, _, z in corners]
     lines += [f"f {n}/{n} {n + 1}/{n + 1} {n + 2}/{n + 2}" for n in range(1, len(corners), 3)]
     path.write_text("\n".join(lines) + "\n")
+
+
+def write_coloured(path, triangles):
+    """Writes a text PLY whose vertices have colours by their positions."""
+    corners = [corner for triangle in triangles for corner in triangle]
+    sides = [(min(side), max(side)) for side in zip(*corners)]
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(corners)}"]
+    lines += [f"property float {axis}" for axis in "xyz"] + [f"property uchar {channel}" for channel in ("red", "green", "blue")]
+    lines += [f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header"]
+    for corner in corners:
+        shares = [round(255 * (x - low) / max(high - low, 1e-9)) for x, (low, high) in zip(corner, sides)]
+        lines.append(" ".join(map(str, (*corner, *shares))))
+    lines += [f"3 {3 * n} {3 * n + 1} {3 * n + 2}" for n in range(len(triangles))]
+    path.write_text("\n".join(lines) + "\n")

@@ -76,8 +76,8 @@ class Sink : public Operator {
 struct OperatorInfo {
   std::string_view name;     ///< the verb, kebab-case
   std::string_view summary;  ///< one sentence, no full stop
-  /// A whole chain that runs in a folder with a `part.stl`, or several, one per line; the last one
-  /// shows the verb.
+  /// A whole chain that runs in a folder with a `part.stl`, and a `part.ply` with colours; or
+  /// several, one per line. The last one shows the verb.
   std::string_view example;
   std::unique_ptr<Operator> (*make)();
   /// Moves grids without changing them (read, write): leaves no line in the history.

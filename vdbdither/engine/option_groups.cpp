@@ -70,6 +70,27 @@ void LatticeOptions::declare(Options& options) {
                   "Pitch of the lattice, in place of --printer");
 }
 
+void InkOptions::declare(Options& options) {
+  options.text(
+      "inks", inks, "NAME,...",
+      "Materials that make up colours: names of the printer's profile, or NAME=#rrggbb; by "
+      "default all of the profile. One whose name contains 'clear' stands for what is not "
+      "opaque");
+  options.number(
+      "black", black, {0, 1},
+      "Where colours can be mixed with more or less black: 0 takes as little as possible, "
+      "1 as much");
+  options.file(
+      "icc", icc, "FILE.icc",
+      "ICC output profile that says which inks make up a colour, in place of the mixing of "
+      "the colours of the inks");
+  options.text("channels", channels, "NAME,...",
+               "Inks of the channels of --icc, in their order; by default those with the names of "
+               "the channels");
+  options.choice("intent", intent, intents, "Rendering intent of --icc");
+  options.choice("black-point", black_point, black_points, "Black of --icc with --intent relative");
+}
+
 void OverwriteOption::declare(Options& options, const std::string& output) {
   options.flag("overwrite", overwrite, "Replaces " + output + " if it exists");
 }

@@ -55,6 +55,33 @@ struct LatticeOptions {
   void declare(Options& options);
 };
 
+/// How an ICC profile of a printer reproduces colours.
+enum class Intent { perceptual, relative, saturation, absolute };
+inline constexpr std::array<Choice<Intent>, 4> intents{
+    {{Intent::perceptual, "perceptual", "Keeps the relations between colours"},
+     {Intent::relative, "relative", "Keeps colours relative to white"},
+     {Intent::saturation, "saturation", "Keeps colours vivid"},
+     {Intent::absolute, "absolute", "Keeps colours as measured, that of white too"}}};
+
+/// The black of a colour and the black of a printer.
+enum class BlackPoint { compensated, kept };
+inline constexpr std::array<Choice<BlackPoint>, 2> black_points{
+    {{BlackPoint::compensated, "compensated", "Scales lightness from black to black"},
+     {BlackPoint::kept, "kept", "Leaves lightness as it is"}}};
+
+/// `--inks`, `--black`, `--icc` and what belongs to it: which materials make up a colour
+/// (io/profile/ink_set.h).
+struct InkOptions {
+  std::string inks;
+  double black = 0.5;
+  std::string icc;
+  std::string channels;
+  Intent intent = Intent::relative;
+  BlackPoint black_point = BlackPoint::compensated;
+
+  void declare(Options& options);
+};
+
 /// `--overwrite` of an operator that writes files of its own.
 struct OverwriteOption {
   bool overwrite = false;

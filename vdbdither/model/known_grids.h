@@ -13,6 +13,7 @@ inline constexpr const char* closest_grid = "closest";      ///< index of the ne
 inline constexpr const char* part_grid = "part";            ///< number of the part, from 1
 inline constexpr const char* colour_grid = "Cd";            ///< linear red, green, blue
 inline constexpr const char* opacity_grid = "Alpha";        ///< opacity, 0 … 1
+inline constexpr const char* coverage_prefix = "coverage_";  ///< + name: share of a material
 inline constexpr const char* displaced_grid = "displaced";  ///< displaced distance, mm
 inline constexpr const char* solid_grid = "solid";          ///< the printed voxels
 inline constexpr const char* material_grid = "material";    ///< index of the material; 0 is empty

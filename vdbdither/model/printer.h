@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,9 @@ namespace vdbdither {
 struct Material {
   std::string name;
   std::array<std::uint8_t, 4> rgba{};  ///< display colour, alpha 255 is opaque
+  /// Measured colour of a full area, linear light with the primaries of Rec. 709, 0 … 1; the
+  /// display colour where there is none.
+  std::optional<openvdb::Vec3d> linear_rgb = std::nullopt;
 };
 
 /// What must be known of a printer before anything is voxelized for it.
@@ -26,6 +30,8 @@ struct PrinterProfile {
   /// How far a droplet spreads: standard deviation of a Gaussian along each axis; zero where
   /// unknown.
   openvdb::Vec3d point_spread_mm{0.0};
+  /// Factor n of Yule and Nielsen for red, green and blue: how the colours of materials mix.
+  openvdb::Vec3d yule_nielsen{2.0};
   std::vector<Material>
       materials;  ///< model materials first to last; support is the printer's own affair
 };

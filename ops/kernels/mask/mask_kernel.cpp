@@ -3,6 +3,7 @@
 // applies it on the DFT. Both are products of one factor per axis.
 #include "ops/kernels/mask/mask_kernel.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace vdbdither {
@@ -72,6 +73,16 @@ void scale(std::vector<double>& factor, double by) {
 }  // namespace
 
 ToroidalKernel::ToroidalKernel(const MaskKernel& kernel, const openvdb::Coord& size) {
+  if (kernel.shape == MaskKernel::Shape::exponential) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int d = 0; d < size[axis]; ++d) {
+        const double distance = std::min(d, size[axis] - d) / kernel.sigma[axis];
+        square_distances_[axis].push_back(distance * distance);
+      }
+    }
+    space_weight_ = kernel.space_weight;
+    return;
+  }
   const bool band_limited = kernel.shape == MaskKernel::Shape::peters;
   Term& space = terms_.emplace_back();
   for (int axis = 0; axis < 3; ++axis) {
@@ -97,6 +108,12 @@ ToroidalKernel::ToroidalKernel(const MaskKernel& kernel, const openvdb::Coord& s
 }
 
 double ToroidalKernel::operator()(int x, int y, int z) const {
+  if (terms_.empty()) {
+    const int planes = (x == 0 ? 1 : 0) + (y == 0 ? 1 : 0) + (z == 0 ? 1 : 0);
+    return (space_weight_ + planes) / (space_weight_ + 3) *
+           decay(std::sqrt(square_distances_[0][x] + square_distances_[1][y] +
+                           square_distances_[2][z]));
+  }
   double sum = 0;
   for (const Term& term : terms_) sum += term[0][x] * term[1][y] * term[2][z];
   return sum;

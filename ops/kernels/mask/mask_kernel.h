@@ -15,16 +15,20 @@ struct MaskKernel {
     gauss,  ///< the Gaussian exp(-d²/2σ²) sampled at the voxels
     axis_mix,  ///< space_weight · N₃(σ) + the sum over the three lattice planes of N₂(plane_sigma)
                ///< inside the plane
+    exponential,  ///< space_weight · exp(-r) + the sum over the three lattice planes of exp(-r)
+                  ///< inside the plane; r is the distance to the nearest repetition in units of σ
   };
   Shape shape = Shape::peters;
-  openvdb::Vec3d sigma{1.1, 1.1, 1.1};  ///< standard deviation along x, y, z, voxels, > 0
+  /// Standard deviation, or length of decay of `exponential`, along x, y, z, voxels, > 0.
+  openvdb::Vec3d sigma{1.1, 1.1, 1.1};
   double plane_sigma = 2.3;  ///< axis_mix: standard deviation inside the planes, voxels, > 0
-  double space_weight = 2.0;  ///< axis_mix: weight of N₃; N₂ and N₃ are densities of integral 1
+  double space_weight = 2.0;  ///< axis_mix: weight of N₃; N₂ and N₃ are densities of integral 1.
+                              ///< exponential: weight of the distance in space
 };
 
 /// A mask kernel on the torus of a periodic tile: summed over all repetitions of the tile and
-/// scaled to 1 at the origin. It is computed with +, -, · and / alone and so has the same bits on
-/// every machine with IEEE doubles.
+/// scaled to 1 at the origin. It is computed with +, -, ·, / and square roots alone and so has the
+/// same bits on every machine with IEEE doubles.
 class ToroidalKernel {
  public:
   /// `size` is the period along x, y, z, each ≥ 1.
@@ -36,7 +40,9 @@ class ToroidalKernel {
  private:
   /// A product of one factor per axis.
   using Term = std::array<std::vector<double>, 3>;
-  std::vector<Term> terms_;
+  std::vector<Term> terms_;  ///< whose sum the kernel is; that of `exponential` has none
+  Term square_distances_;    ///< of `exponential`, along each axis, in units of σ
+  double space_weight_ = 0;
 };
 
 }  // namespace vdbdither

@@ -1,5 +1,7 @@
 #include "ops/kernels/mask/mask_tile.h"
 
+#include <algorithm>
+
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
 
@@ -21,6 +23,8 @@ std::string nameOf(MaskKernel::Shape shape) {
       return "gauss";
     case MaskKernel::Shape::axis_mix:
       return "axis-mix";
+    case MaskKernel::Shape::exponential:
+      return "exponential";
   }
   return "";
 }
@@ -42,10 +46,11 @@ FloatGrid::Ptr emptyMask(const VoidAndCluster& settings) {
   grid->insertMeta("mask:seed", openvdb::Int32Metadata(static_cast<int>(settings.seed)));
   grid->insertMeta("mask:kernel", openvdb::StringMetadata(nameOf(kernel.shape)));
   grid->insertMeta("mask:sigma", openvdb::Vec3DMetadata(kernel.sigma));
-  if (kernel.shape == MaskKernel::Shape::axis_mix) {
+  const bool is_axis_mix = kernel.shape == MaskKernel::Shape::axis_mix;
+  if (is_axis_mix)
     grid->insertMeta("mask:plane_sigma", openvdb::DoubleMetadata(kernel.plane_sigma));
+  if (is_axis_mix || kernel.shape == MaskKernel::Shape::exponential)
     grid->insertMeta("mask:space_weight", openvdb::DoubleMetadata(kernel.space_weight));
-  }
   return grid;
 }
 
@@ -74,6 +79,23 @@ VoidAndCluster defaultMask() {
   settings.size = Coord(64);
   settings.kernel.shape = MaskKernel::Shape::axis_mix;
   settings.kernel.sigma = openvdb::Vec3d(0.8);
+  return settings;
+}
+
+VoidAndCluster halftoneMask(const openvdb::Vec3d& pitch_mm) {
+  constexpr double decay_mm = 0.07;
+  constexpr double least_tile_mm = 1.75;
+  constexpr int least_size = 16;
+  constexpr int greatest_size = 256;
+  const double mean_mm = (pitch_mm.x() + pitch_mm.y() + pitch_mm.z()) / 3;
+  VoidAndCluster settings;
+  settings.kernel.shape = MaskKernel::Shape::exponential;
+  settings.kernel.space_weight = 3;
+  for (int axis = 0; axis < 3; ++axis) {
+    settings.kernel.sigma[axis] = std::max(decay_mm, mean_mm) / pitch_mm[axis];
+    int& size = settings.size[axis] = least_size;
+    while (size < greatest_size && size * pitch_mm[axis] < least_tile_mm) size *= 2;
+  }
   return settings;
 }
 

@@ -54,6 +54,13 @@ double filterAt(int d, double sigma, int size) {
 double kernelAt(const VoidAndCluster& mask, int x, int y, int z) {
   const MaskKernel& kernel = mask.kernel;
   const Coord d(x, y, z);
+  if (kernel.shape == MaskKernel::Shape::exponential) {
+    double squares = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      squares += std::pow(std::min(d[axis], mask.size[axis] - d[axis]) / kernel.sigma[axis], 2);
+    const int planes = (x == 0 ? 1 : 0) + (y == 0 ? 1 : 0) + (z == 0 ? 1 : 0);
+    return (kernel.space_weight + planes) * std::exp(-std::sqrt(squares));
+  }
   double space = 1;
   for (int axis = 0; axis < 3; ++axis) {
     space *= (kernel.shape == MaskKernel::Shape::peters ? filterAt : gaussianAt)(
@@ -217,6 +224,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{{8, 8, 8}, Shape::gauss, 1.9}, Case{{12, 12, 12}, Shape::peters, 0.8},
                     Case{{12, 12, 12}, Shape::peters, 1.9}, Case{{12, 12, 12}, Shape::gauss, 0.6},
                     Case{{12, 12, 12}, Shape::gauss, 3.1}, Case{{12, 12, 12}, Shape::axis_mix, 1.1},
+                    Case{{12, 8, 16}, Shape::exponential, 1.6},
                     Case{{16, 16, 16}, Shape::peters, 1.1}, Case{{16, 16, 16}, Shape::gauss, 1.1},
                     Case{{24, 24, 24}, Shape::gauss, 1.1}, Case{{7, 12, 9}, Shape::peters, 1.1},
                     Case{{5, 1, 16}, Shape::gauss, 1.1}, Case{{32, 32, 1}, Shape::peters, 1.5},

@@ -1,0 +1,104 @@
+#include "io/profile/ink_set.h"
+
+#include <algorithm>
+#include <cctype>
+#include <string>
+
+#include "io/image/srgb.h"
+#include "io/profile/icc_coverages.h"
+#include "io/profile/material_table.h"
+#include "io/profile/printer_profile.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
+
+namespace vdbdither {
+
+namespace {
+
+bool isClear(const Material& material) {
+  std::string name = material.name;
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return name.find("clear") != std::string::npos;
+}
+
+std::vector<Material> namedInks(const std::string& text, const std::vector<Material>& known) {
+  std::vector<Material> inks;
+  for (const std::string& name : materialEntries(text)) {
+    try {
+      inks.push_back(parseMaterial(name, known));
+    } catch (const UsageError& error) {
+      throw UsageError(std::string("--inks: ") + error.what());
+    }
+    const std::string& last = inks.back().name;
+    if (std::any_of(inks.begin(), inks.end() - 1,
+                    [&](const Material& other) { return other.name == last; }))
+      throw UsageError("--inks: '" + last + "' is there twice");
+  }
+  return inks;
+}
+
+/// The profile in the metadata, or one that says nothing.
+PrinterProfile printerOf(const Schema& in) {
+  const auto printer = in.metadata.find(printer_key);
+  return printer == in.metadata.end() ? PrinterProfile() : printerProfileFromJson(printer->second);
+}
+
+}  // namespace
+
+InkSet inkSetOf(const InkOptions& options, const Schema& in) {
+  InkSet set;
+  const std::vector<Material> known = printerOf(in).materials;
+  set.yule_nielsen = yuleNielsenOf(in);
+  set.inks = options.inks.empty() ? known : namedInks(options.inks, known);
+  if (set.inks.empty())
+    throw UsageError(
+        "--inks: no printer profile names materials; name them, as in "
+        "white,black,cyan,magenta,yellow");
+  constexpr std::size_t most = 12;
+  const std::size_t taken = known.empty() ? most : std::min(known.size(), most);
+  if (set.inks.size() > taken)
+    throw UsageError("--inks: there are " + std::to_string(set.inks.size()) +
+                     " materials, and the printer takes " + std::to_string(taken));
+  set.linear_rgb = linearColoursOf(set.inks, in);
+  for (std::size_t ink = 0; ink < set.inks.size(); ++ink) {
+    if (!isClear(set.inks[ink])) continue;
+    if (set.clear)
+      throw UsageError("--inks: '" + set.inks[*set.clear].name + "' and '" + set.inks[ink].name +
+                       "' are both clear; name one of them");
+    set.clear = ink;
+  }
+  if (set.inks.size() == 1 && set.clear)
+    throw UsageError("--inks: there must be an ink besides the clear one");
+  set.black = options.black;
+  if (!options.icc.empty()) {
+    set.table = readIccCoverages(options, set);
+  } else if (!options.channels.empty()) {
+    throw UsageError("--channels: only a profile of --icc has channels; leave it out");
+  }
+  return set;
+}
+
+std::vector<openvdb::Vec3d> linearColoursOf(const std::vector<Material>& materials,
+                                            const Schema& in) {
+  const std::vector<Material> known = printerOf(in).materials;
+  std::vector<openvdb::Vec3d> colours;
+  for (const Material& material : materials) {
+    const auto same = std::find_if(known.begin(), known.end(), [&](const Material& other) {
+      return other.name == material.name && other.rgba == material.rgba;
+    });
+    if (same != known.end() && same->linear_rgb) {
+      colours.push_back(*same->linear_rgb);
+      continue;
+    }
+    openvdb::Vec3d& colour = colours.emplace_back();
+    for (int channel = 0; channel < 3; ++channel)
+      colour[channel] =
+          double{linearOfSrgbBytes()[material.rgba[static_cast<std::size_t>(channel)]]};
+  }
+  return colours;
+}
+
+openvdb::Vec3d yuleNielsenOf(const Schema& in) { return printerOf(in).yule_nielsen; }
+
+}  // namespace vdbdither

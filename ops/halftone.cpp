@@ -1,0 +1,226 @@
+#include "ops/kernels/colour/halftone.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/profile/ink_set.h"
+#include "io/profile/material_table.h"
+#include "io/vdb/mask_cache.h"
+#include "ops/kernels/colour/coverage_reader.h"
+#include "ops/kernels/mask/mask_tile.h"
+#include "ops/kernels/mask/threshold_mask.h"
+#include "vdbdither/engine/comma_list.h"
+#include "vdbdither/engine/operator.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/openvdb.h"
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::BoolGrid;
+using openvdb::FloatGrid;
+using openvdb::Int32Grid;
+using openvdb::Vec3SGrid;
+
+enum class MaskSource { blue, white };
+constexpr std::array<Choice<MaskSource>, 2> mask_sources{
+    {{MaskSource::blue, "blue", "Blue noise for the lattice, made once and cached"},
+     {MaskSource::white, "white", "White noise: every voxel on its own"}}};
+
+/// `material` from `solid` and colours or coverages.
+class HalftoneFilter : public Filter {
+ public:
+  void declare(Options& options) override {
+    inks_.declare(options);
+    options.text("core", core_, "NAME",
+                 "Material of voxels without a colour; by default the lightest ink");
+    options.text("coverages", coverages_, "GRID=NAME,...",
+                 "Grids of float that hold the coverages of materials, in place of colours; by "
+                 "default the grids coverage_NAME, if there are any");
+    options.text("rest", rest_, "NAME",
+                 "Material of what coverages leave to a sum of 1; by default they are divided by "
+                 "their sum");
+    options.choice("mask", mask_, mask_sources, "Thresholds");
+    options.triple(
+        "size", size_, "N|NX,NY,NZ", {0, 256},
+        "Period of --mask blue along x, y and z, in voxels; 0: powers of two, 1.75 mm or "
+        "more");
+    options.integer("seed", seed_, {0, std::numeric_limits<int>::max()}, "Seed of the mask");
+  }
+
+  Schema plan(const Schema& in) override {
+    const auto solid = findGrid<BoolGrid>(in.grids, solid_grid);
+    planGrids(in);
+    set_ = inkSetOf(inks_, in);
+    for (Column& column : columns_) column.material = indexOf("--coverages", column.name);
+    if (columns_.empty()) {
+      separation_ = separationInto(set_);
+      if (has_opacity_ && !set_.clear)
+        report().warn("no ink is clear: 'Alpha' is ignored and all is printed opaque");
+    } else if (!inks_.icc.empty()) {
+      throw UsageError("--icc: coverages are not separated again; leave it out");
+    }
+    if (!rest_.empty() && columns_.empty())
+      throw UsageError("--rest: colours have no rest; leave it out");
+
+    const std::vector<std::size_t> order = darkestFirst(set_);
+    if (core_.empty()) core_ = set_.inks[order.back()].name;
+    core_material_ = static_cast<std::int32_t>(indexOf("--core", core_)) + 1;
+    rest_material_ = rest_.empty() ? std::nullopt : std::optional(indexOf("--rest", rest_));
+    halftone_.emplace(order, mask(in.lattice.pitch_mm));
+
+    Schema out = in;
+    const auto material = Int32Grid::create(0);
+    material->setName(material_grid);
+    material->setTransform(solid->transform().copy());
+    out.grids[material_grid] = material;
+    out.metadata[materials_key] = toJson(MaterialTable(set_.inks));
+    return out;
+  }
+
+  [[nodiscard]] std::vector<Read> reads() const override {
+    std::vector<Read> reads{{solid_grid, Reach::point()}};
+    for (const Column& column : columns_) reads.push_back({column.grid, Reach::point()});
+    if (!columns_.empty()) return reads;
+    reads.push_back({colour_grid, Reach::point()});
+    if (has_opacity_) reads.push_back({opacity_grid, Reach::point()});
+    return reads;
+  }
+
+  [[nodiscard]] double memoryBytes() const override {
+    return halftone_->memoryBytes() + (separation_ ? separation_->memoryBytes() : 0);
+  }
+
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_surface_leaf = cost::halftone_us};
+  }
+
+  [[nodiscard]] Grids run(const Slab& in) const override {
+    const auto solid = findGrid<BoolGrid>(in.grids, solid_grid);
+    const auto material = Int32Grid::create(0);
+    material->setName(material_grid);
+    material->setTransform(solid->transform().copy());
+    if (columns_.empty()) {
+      const auto colour = findGrid<Vec3SGrid>(in.grids, colour_grid);
+      const auto opacity = has_opacity_ ? findGrid<FloatGrid>(in.grids, opacity_grid) : nullptr;
+      const ColourCoverages source(*colour, opacity.get(), set_, *separation_);
+      material->setTree(halftone_->run(solid->tree(), source, core_material_, in.core));
+    } else {
+      std::vector<FloatGrid::ConstPtr> held;
+      std::vector<GridCoverages::Grid> grids;
+      for (const Column& column : columns_) {
+        held.push_back(findGrid<FloatGrid>(in.grids, column.grid));
+        grids.push_back({held.back().get(), column.grid, column.material});
+      }
+      const GridCoverages source(std::move(grids), rest_material_);
+      material->setTree(halftone_->run(solid->tree(), source, core_material_, in.core));
+    }
+    return {{material_grid, material}};
+  }
+
+ private:
+  /// A grid of coverages.
+  struct Column {
+    std::string grid;
+    std::string name;  ///< of the material
+    std::size_t material = 0;
+  };
+
+  /// Finds out whether coverages or colours are read.
+  void planGrids(const Schema& in) {
+    columns_.clear();
+    for (const std::string& entry :
+         coverages_.empty() ? std::vector<std::string>{} : commaList(coverages_)) {
+      const std::size_t equals = entry.find('=');
+      if (equals == std::string::npos)
+        throw UsageError("--coverages: '" + entry +
+                         "' must be a grid and a material, as in density=black");
+      columns_.push_back({entry.substr(0, equals), entry.substr(equals + 1)});
+    }
+    if (coverages_.empty()) {
+      const std::string prefix = coverage_prefix;
+      for (const auto& [name, grid] : in.grids)
+        if (name.starts_with(prefix)) columns_.push_back({name, name.substr(prefix.size())});
+    }
+    for (const Column& column : columns_) findGrid<FloatGrid>(in.grids, column.grid);
+    has_opacity_ = columns_.empty() && in.grids.contains(opacity_grid);
+    if (has_opacity_) findGrid<FloatGrid>(in.grids, opacity_grid);
+    if (columns_.empty()) {
+      if (!in.grids.contains(colour_grid))
+        throw DataError(
+            "no colours: there must be the grid 'Cd' (mesh2sdf --colour makes it), grids named "
+            "coverage_ and a material, or those that --coverages names");
+      findGrid<Vec3SGrid>(in.grids, colour_grid);
+      return;
+    }
+    // The inks that the coverages were made for.
+    const auto table = in.metadata.find(materials_key);
+    if (!inks_.inks.empty() || table == in.metadata.end()) return;
+    for (const Material& ink : materialTableFromJson(table->second)) {
+      if (!inks_.inks.empty()) inks_.inks += ",";
+      inks_.inks += ink.name + "=";
+      for (std::size_t channel = 0; channel < ink.rgba.size(); ++channel)
+        inks_.inks += (channel > 0 ? "," : "") + std::to_string(ink.rgba[channel]);
+    }
+  }
+
+  [[nodiscard]] std::size_t indexOf(const std::string& option, const std::string& name) const {
+    for (std::size_t ink = 0; ink < set_.inks.size(); ++ink)
+      if (set_.inks[ink].name == name) return ink;
+    std::string message = option + ": no ink '" + name + "'; there are";
+    for (const Material& ink : set_.inks) message += " " + ink.name;
+    throw UsageError(message);
+  }
+
+  /// Out of the user's cache, or new.
+  [[nodiscard]] ThresholdMask mask(const openvdb::Vec3d& pitch_mm) const {
+    if (mask_ == MaskSource::white) {
+      if (size_ != openvdb::Coord(0))
+        throw UsageError("--size: only --mask blue has it; leave it out");
+      return ThresholdMask::whiteNoise(static_cast<std::uint64_t>(seed_));
+    }
+    VoidAndCluster settings = halftoneMask(pitch_mm);
+    settings.seed = static_cast<std::uint64_t>(seed_);
+    for (int axis = 0; axis < 3; ++axis)
+      if (size_[axis] != 0) settings.size[axis] = size_[axis];
+    const auto make = [&] {
+      return maskOf(settings, [this](double fraction) { report().progress(fraction); });
+    };
+    return ThresholdMask(*cachedMask(*emptyMask(settings), make,
+                                     [this](const std::string& text) { report().warn(text); }));
+  }
+
+  InkOptions inks_;
+  std::string core_;
+  std::string coverages_;
+  std::string rest_;
+  MaskSource mask_ = MaskSource::blue;
+  openvdb::Coord size_{0, 0, 0};
+  int seed_ = 1;
+
+  std::vector<Column> columns_;  ///< empty: colours are read
+  bool has_opacity_ = false;
+  InkSet set_;
+  std::unique_ptr<Separation> separation_;
+  std::optional<Halftone> halftone_;
+  std::int32_t core_material_ = 1;
+  std::optional<std::size_t> rest_material_;
+};
+
+}  // namespace
+
+extern const OperatorInfo halftone;
+const OperatorInfo halftone{
+    "halftone", "The material of every printed voxel, for colours or coverages",
+    "mesh2sdf part.ply --printer mimaki-3duj-553 --colour ! dither ! halftone ! slice-export out",
+    []() -> std::unique_ptr<Operator> { return std::make_unique<HalftoneFilter>(); }};
+
+}  // namespace vdbdither

@@ -1,0 +1,173 @@
+#include "ops/kernels/colour/coverage_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "vdbdither/model/errors.h"
+
+namespace vdbdither {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Vec3s;
+using openvdb::Vec3STree;
+
+namespace {
+
+class ColourReader : public CoverageReader {
+ public:
+  ColourReader(const openvdb::Vec3SGrid& colour, const FloatGrid* opacity, const InkSet& set,
+               const Separation& separation)
+      : colour_(colour.tree()), set_(set), separation_(separation), inks_(set.inks.size()) {
+    if (opacity != nullptr && set.clear) opacity_.emplace(opacity->tree());
+  }
+
+  bool visit(const Coord& origin) override {
+    origin_ = origin;
+    leaf_ = colour_.probeConstLeaf(origin);
+    opacity_leaf_ = opacity_ ? opacity_->probeConstLeaf(origin) : nullptr;
+    tile_ = leaf_ == nullptr && colour_.isValueOn(origin);
+    return leaf_ != nullptr || tile_;
+  }
+
+  bool read(unsigned offset, std::span<float> coverages) override {
+    if (!tile_ && !leaf_->isValueOn(offset)) return false;
+    const Vec3s colour = leaf_ != nullptr ? leaf_->getValue(offset) : colour_.getValue(origin_);
+    // Voxels below each other often have one colour.
+    if (!known_ || colour != last_) {
+      if (!std::isfinite(colour[0]) || !std::isfinite(colour[1]) || !std::isfinite(colour[2]))
+        refuse(offset);
+      separation_.run(colour, inks_);
+      last_ = colour;
+      known_ = true;
+    }
+    std::copy(inks_.begin(), inks_.end(), coverages.begin());
+    if (opacity_) addClear(opacityAt(offset), coverages);
+    return true;
+  }
+
+ private:
+  [[nodiscard]] float opacityAt(unsigned offset) const {
+    if (opacity_leaf_ == nullptr)
+      return opacity_->isValueOn(origin_) ? opacity_->getValue(origin_) : 1;
+    return opacity_leaf_->isValueOn(offset) ? opacity_leaf_->getValue(offset) : 1;
+  }
+
+  void addClear(float opacity, std::span<float> coverages) const {
+    const float share = std::isnan(opacity) ? 1 : std::clamp(opacity, 0.0F, 1.0F);
+    for (float& coverage : coverages) coverage *= share;
+    coverages[*set_.clear] += 1 - share;
+  }
+
+  [[noreturn]] void refuse(unsigned offset) const {
+    std::ostringstream text;
+    text << "grid 'Cd' has a colour that is not a number at voxel " << at(offset)
+         << "; mend the grid";
+    throw DataError(text.str());
+  }
+
+  [[nodiscard]] Coord at(unsigned offset) const {
+    return origin_ + Vec3STree::LeafNodeType::offsetToLocalCoord(offset);
+  }
+
+  openvdb::tree::ValueAccessor<const Vec3STree, false> colour_;
+  std::optional<openvdb::tree::ValueAccessor<const FloatTree, false>> opacity_;
+  const InkSet& set_;
+  const Separation& separation_;
+  Coord origin_;
+  const Vec3STree::LeafNodeType* leaf_ = nullptr;
+  const FloatTree::LeafNodeType* opacity_leaf_ = nullptr;
+  bool tile_ = false;
+  std::vector<float> inks_;  ///< coverages of `last_`
+  Vec3s last_{0.0F};
+  bool known_ = false;
+};
+
+class GridReader : public CoverageReader {
+ public:
+  GridReader(const std::vector<GridCoverages::Grid>& grids, std::optional<std::size_t> rest)
+      : rest_(rest) {
+    for (const auto& [grid, name, material] : grids)
+      columns_.push_back(
+          {FloatGrid::ConstAccessor(grid->tree()), name, material, nullptr, false, 0});
+  }
+
+  bool visit(const Coord& origin) override {
+    origin_ = origin;
+    bool some = false;
+    for (Column& column : columns_) {
+      column.leaf = column.values.probeConstLeaf(origin);
+      column.tile = column.leaf == nullptr && column.values.isValueOn(origin);
+      column.tile_value = column.tile ? column.values.getValue(origin) : 0;
+      some |= column.leaf != nullptr || column.tile;
+    }
+    return some;
+  }
+
+  bool read(unsigned offset, std::span<float> coverages) override {
+    std::fill(coverages.begin(), coverages.end(), 0.0F);
+    bool some = false;
+    double sum = 0;
+    for (const Column& column : columns_) {
+      const bool held = column.leaf != nullptr && column.leaf->isValueOn(offset);
+      if (!held && !column.tile) continue;
+      some = true;
+      const float value = held ? column.leaf->getValue(offset) : column.tile_value;
+      if (!(value >= 0) || !std::isfinite(value))
+        refuse(column.name, "is " + textOf(value), offset);
+      coverages[column.material] += value;
+      sum += double{value};
+    }
+    if (!some) return false;
+    if (rest_ && sum < 1) {
+      coverages[*rest_] += static_cast<float>(1 - sum);
+      return true;
+    }
+    if (sum == 0) refuse(columns_.front().name, "and the other coverages are all 0", offset);
+    for (float& coverage : coverages) coverage = static_cast<float>(double{coverage} / sum);
+    return true;
+  }
+
+ private:
+  struct Column {
+    FloatGrid::ConstAccessor values;
+    std::string name;
+    std::size_t material;
+    const FloatTree::LeafNodeType* leaf;
+    bool tile;
+    float tile_value;
+  };
+
+  static std::string textOf(float value) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+  }
+
+  [[noreturn]] void refuse(const std::string& name, const std::string& what,
+                           unsigned offset) const {
+    std::ostringstream text;
+    text << "grid '" << name << "' " << what << " at voxel "
+         << origin_ + FloatTree::LeafNodeType::offsetToLocalCoord(offset)
+         << "; coverages must be numbers from 0 to 1, of which one at least is above 0";
+    throw DataError(text.str());
+  }
+
+  std::optional<std::size_t> rest_;
+  std::vector<Column> columns_;
+  Coord origin_;
+};
+
+}  // namespace
+
+std::unique_ptr<CoverageReader> ColourCoverages::reader() const {
+  return std::make_unique<ColourReader>(colour_, opacity_, set_, separation_);
+}
+
+std::unique_ptr<CoverageReader> GridCoverages::reader() const {
+  return std::make_unique<GridReader>(grids_, rest_);
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+
+#include <openvdb/Types.h>
+
+#include "vdbdither/model/ink_set.h"
+
+namespace vdbdither {
+
+/// Inks for colours: how large a share of the voxels each ink of a set gets.
+class Separation {
+ public:
+  virtual ~Separation() = default;
+
+  /// Sets `coverages`, one for each ink of the set: ≥ 0, of sum 1 to 1e-6, and 0 for the clear ink.
+  /// Depends continuously on the colour. Safe to call from many threads.
+  /// @param linear_rgb  finite; negative values count as 0
+  virtual void run(const openvdb::Vec3s& linear_rgb, std::span<float> coverages) const = 0;
+
+  [[nodiscard]] virtual double memoryBytes() const = 0;
+};
+
+/// Returns the separation into the inks of `set`: by its table if it has one, otherwise by the law
+/// of Yule and Nielsen (ops/kernels/colour/ink_separation.h). Throws UsageError for a set that has
+/// no ink but the clear one.
+std::unique_ptr<Separation> separationInto(const InkSet& set);
+
+}  // namespace vdbdither

@@ -1,0 +1,167 @@
+#include <memory>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "io/profile/material_table.h"
+#include "io/profile/printer_profile.h"
+#include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/registry.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/openvdb.h"
+
+namespace vdbdither {
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using openvdb::Int32Grid;
+using openvdb::Vec3SGrid;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+struct Planned {
+  Planned(const std::string& verb, std::vector<std::string> arguments)
+      : made(findOperator(verb).make()) {
+    Options options;
+    made->declare(options);
+    options.parse(arguments);
+  }
+  Filter& filter() { return static_cast<Filter&>(*made); }
+
+  std::unique_ptr<Operator> made;
+};
+
+const CoordBBox box(Coord(0), Coord(15));
+
+Schema schemaWith(const std::vector<std::string>& grids) {
+  Schema schema;
+  schema.lattice = {{0.05, 0.05, 0.05}, {0, 0, 0}, box};
+  schema.grids["solid"] = openvdb::BoolGrid::create(false);
+  for (const std::string& name : grids) {
+    if (name == "Cd") {
+      schema.grids[name] = Vec3SGrid::create();
+    } else {
+      schema.grids[name] = FloatGrid::create();
+    }
+  }
+  PrinterProfile printer;
+  printer.name = "printer";
+  printer.pitch_mm = openvdb::Vec3d(0.05);
+  printer.materials = {{"VeroPureWht", {240, 240, 240, 255}},
+                       {"VeroBlack", {26, 26, 29, 255}},
+                       {"VeroClear", {227, 233, 253, 255}},
+                       {"VeroCyan", {0, 90, 158, 255}}};
+  schema.metadata[printer_key] = toJson(printer);
+  return schema;
+}
+
+const std::vector<std::string> small_mask = {"--size", "8"};
+
+void expectRefusal(const std::string& verb, std::vector<std::string> arguments,
+                   const Schema& schema, const std::string& message) {
+  if (verb == "halftone") arguments.insert(arguments.end(), small_mask.begin(), small_mask.end());
+  Planned planned(verb, arguments);
+  EXPECT_THAT([&] { planned.filter().plan(schema); }, ThrowsMessage<Error>(HasSubstr(message)));
+}
+
+TEST(Halftone, ListsTheMaterialsOfTheProfile) {
+  const Schema out = Planned("halftone", small_mask).filter().plan(schemaWith({"Cd"}));
+  const MaterialTable table = materialTableFromJson(out.metadata.at(materials_key));
+  ASSERT_EQ(table.size(), 4U);
+  EXPECT_EQ(table[3].name, "VeroCyan");
+}
+
+TEST(Halftone, RefusesWhatItCannotDo) {
+  const Schema colours = schemaWith({"Cd"});
+  expectRefusal("halftone", {}, schemaWith({}),
+                "no colours: there must be the grid 'Cd' (mesh2sdf --colour makes it), grids named "
+                "coverage_ and a material, or those that --coverages names");
+  expectRefusal("halftone", {"--inks", "white,blck"}, colours, "--inks: no material 'blck'");
+  expectRefusal("halftone", {"--inks", "white,black,white"}, colours,
+                "--inks: 'white' is there twice");
+  expectRefusal("halftone", {"--inks", "white,black,cyan,magenta,yellow"}, colours,
+                "--inks: there are 5 materials, and the printer takes 4");
+  expectRefusal("halftone", {"--inks", "clear"}, colours,
+                "--inks: there must be an ink besides the clear one");
+  expectRefusal("halftone", {"--inks", "clear,white,VeroClear"}, colours,
+                "--inks: 'clear' and 'VeroClear' are both clear; name one of them");
+  expectRefusal("halftone", {"--core", "yellow"}, colours,
+                "--core: no ink 'yellow'; there are VeroPureWht VeroBlack VeroClear VeroCyan");
+  expectRefusal("halftone", {"--rest", "VeroPureWht"}, colours,
+                "--rest: colours have no rest; leave it out");
+  expectRefusal("halftone", {"--coverages", "density"}, colours,
+                "--coverages: 'density' must be a grid and a material, as in density=black");
+  expectRefusal("halftone", {"--coverages", "density=black"}, colours, "no grid 'density'");
+  expectRefusal("halftone", {"--coverages", "density=blue"}, schemaWith({"density"}),
+                "--coverages: no ink 'blue'");
+  expectRefusal("halftone", {"--icc", "inks.icc"}, schemaWith({"coverage_VeroCyan"}), "--icc: ");
+  expectRefusal("halftone", {"--icc", "no such.icc"}, colours, "--icc: no such file 'no such.icc'");
+  expectRefusal("halftone", {"--channels", "cyan"}, colours,
+                "--channels: only a profile of --icc has channels; leave it out");
+  expectRefusal("halftone", {"--mask", "white"}, colours,
+                "--size: only --mask blue has it; leave it out");
+  Schema bare = colours;
+  bare.metadata.clear();
+  expectRefusal("halftone", {}, bare,
+                "--inks: no printer profile names materials; name them, as in "
+                "white,black,cyan,magenta,yellow");
+  expectRefusal("separate", {}, schemaWith({}), "no grid 'Cd'");
+}
+
+TEST(Halftone, TakesTheCoveragesThatSeparateMakes) {
+  const Schema colours = schemaWith({"Cd"});
+  Planned separate("separate", {});
+  Planned direct("halftone", small_mask);
+  Planned second("halftone", small_mask);
+  const Schema separated = separate.filter().plan(colours);
+  EXPECT_TRUE(separated.grids.contains("coverage_VeroBlack"));
+  direct.filter().plan(colours);
+  second.filter().plan(separated);
+
+  const auto solid = openvdb::BoolGrid::create(false);
+  solid->fill(box, true, true);
+  const auto colour = Vec3SGrid::create();
+  for (auto ijk = box.begin(); ijk; ++ijk)
+    if ((*ijk).x() < 12)
+      colour->tree().setValue(*ijk,
+                              openvdb::Vec3s(0.3F, 0.05F * static_cast<float>((*ijk).y()), 0.5F));
+  Slab slab{{0, 16}, {0, 16}, {{"solid", solid}, {"Cd", colour}}};
+  const Grids expected = direct.filter().run(slab);
+  for (const auto& [name, grid] : separate.filter().run(slab)) slab.grids[name] = grid;
+  slab.grids.erase("Cd");
+  const Grids found = second.filter().run(slab);
+  const auto materials = [](const Grids& grids) {
+    return openvdb::gridConstPtrCast<Int32Grid>(grids.at("material"));
+  };
+  int differences = 0;
+  std::map<std::int32_t, int> used;
+  for (auto ijk = box.begin(); ijk; ++ijk) {
+    const std::int32_t material = materials(expected)->tree().getValue(*ijk);
+    ++used[material];
+    differences += material != materials(found)->tree().getValue(*ijk) ? 1 : 0;
+    if ((*ijk).x() >= 12) {
+      ASSERT_EQ(material, 1);
+    }
+  }
+  EXPECT_EQ(differences, 0);
+  EXPECT_GT(used[2], 100);
+  EXPECT_GT(used[4], 100);
+  EXPECT_EQ(used[3], 0);
+}
+
+TEST(MaterialAssign, HalftonesColoursUnlessTheCommandLineNamesAMaterial) {
+  const Schema colours = schemaWith({"Cd"});
+  const auto materials = [&](std::vector<std::string> arguments) {
+    const Schema out = Planned("material-assign", arguments).filter().plan(colours);
+    return materialTableFromJson(out.metadata.at(materials_key)).size();
+  };
+  EXPECT_EQ(materials({}), 4U);
+  EXPECT_EQ(materials({"--material", "black"}), 1U);
+  EXPECT_EQ(materials({"--shell", "0.5mm:white", "--core", "black"}), 2U);
+}
+
+}  // namespace
+}  // namespace vdbdither
