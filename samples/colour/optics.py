@@ -18,9 +18,11 @@ import numpy as np
 XYZ_OF_RGB = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])
 WHITE = XYZ_OF_RGB.sum(axis=1)
 
-# Zhang and Wandell: the channels luminance, red-green and blue-yellow. Their filters are sums of Gaussians exp(-r^2 / s^2),
-# here (weight, s in degrees of visual angle); each Gaussian and the sum are scaled to an integral of 1.
-OPPONENT_OF_XYZ = np.array([[0.279, 0.72, -0.107], [-0.449, 0.29, -0.077], [0.086, -0.59, 0.501]])
+# Zhang and Wandell: the channels luminance, red-green and blue-yellow, with the digits of the authors' program; the paper
+# rounds them and prints 0.077 with the wrong sign, which would make white reddish. Their filters are sums of Gaussians
+# exp(-r^2 / s^2), here (weight, s in degrees of visual angle); each Gaussian and the sum are scaled to an integral of 1.
+OPPONENT_OF_XYZ = np.array([[278.7336, 721.8031, -106.5520], [-448.7736, 289.8056, 77.1569],
+                            [85.9513, -589.9859, 501.1089]]) / 1000
 FILTERS = (((0.921, 0.0283), (0.105, 0.133), (-0.108, 4.336)), ((0.531, 0.0392), (0.330, 0.494)), ((0.488, 0.0536), (0.371, 0.386)))
 
 VIEWING_DISTANCE_MM = 300

@@ -1,13 +1,14 @@
 #!/usr/bin/python3
 """Studies the colour prints of the program: flat plates of one colour, made, sliced, and judged from their slices.
 
-    samples/colour/study.py --program build/release/vdbdither [--part grain|accuracy|dither]... [--printer NAME]...
+    samples/colour/study.py --program build/release/vdbdither [--part grain|accuracy|dither|oracles]... [--printer NAME]...
         [--normals N] [--recipes N] [--colours N] [--steps "dither ! halftone"] [--json FILE]
 
 grain     the grain of facets as a share of the grain of random choice (judge.py): 20 normals x 24 recipes
 accuracy  CIEDE2000 between the wanted colour and the one that the counted coverages predict: the ColorChecker, and random
           mixtures of the inks; in a colour that inks can mix, the law of mixtures itself has no error
 dither    coverages and colours with the shape dither, without it, and interlaced
+oracles   the grain beside that of other ways to choose materials, with the same coverages on the same voxels (oracles.py)
 
 A plate is a box with a colour at its vertices, as OBJ. Its facet has the normal of the case; each normal has its own place on
 the lattice. Recipes are the colours of the ColorChecker in sRGB, as published for D65 and 8 bits.
@@ -25,9 +26,11 @@ import time
 
 import numpy as np
 import optics
+import oracles
 from judge import LENGTHS_MM, judge
 from printed_stack import read_stack
 
+PARTS = ("grain", "accuracy", "dither", "oracles")
 PRINTERS = ("stratasys-j750-14um", "mimaki-3duj-553")
 STEPS = "dither ! halftone"
 
@@ -217,8 +220,8 @@ def study_dither(program, printer, normals, recipes):
 
 
 def lines_of_dither(cases):
-    lines = [f"{'coverage in the shell':22}{'cases':>6}{'off from no dither':>20}{'':>8}{'rms, 1 mm':>10}{'CIEDE2000 between':>22}",
-             f"{'':28}{'mean':>20}{'worst':>8}{'mean':>10}{'dithers, mean, worst':>22}{'wanted, mean':>14}"]
+    lines = [f"{'':22}{'':6}{'coverage off no dither':>24}{'rms, 1 mm':>12}{'CIEDE2000 to no dither':>24}{'to wanted':>12}",
+             f"{'':18}{'cases':>10}{'mean':>12}{'worst':>12}{'mean':>12}{'mean':>12}{'worst':>12}{'mean':>12}"]
     plain = {(tuple(case["normal"]), case["recipe"]): case for case in cases if case["dither"] == "no dither"}
     for title in DITHERS:
         rows = [case for case in cases if case["dither"] == title]
@@ -226,8 +229,37 @@ def lines_of_dither(cases):
         off = [abs(case["coverage"][name] - other["coverage"][name]) for case, other in pairs for name in case["coverage"]]
         rms = [value for case in rows for value in case["coverage_rms"].values()]
         de = [differences(*(np.array(side["predicted"]["linear_rgb"]) for side in pair)) for pair in pairs]
-        lines.append(f"{title:22}{len(rows):6}{np.mean(off):20.6f}{np.max(off):8.6f}{np.mean(rms):10.6f}"
-                     f"{np.mean(de):14.4f}{np.max(de):8.4f}{np.mean([case['de'] for case in rows]):14.3f}")
+        lines.append(f"{title:22}{len(rows):6}{np.mean(off):12.6f}{np.max(off):12.6f}{np.mean(rms):12.6f}"
+                     f"{np.mean(de):12.4f}{np.max(de):12.4f}{np.mean([case['de'] for case in rows]):12.3f}")
+    return lines
+
+
+def study_oracles(program, printer, normals, recipes):
+    cases = []
+    for number, normal in enumerate(normals):
+        for name in recipes:
+            rgb = optics.linear(np.array(COLOURCHECKER[name]) / 255)
+            stack = program.stack(printer, normal, PLATE_MM, place_of(number), rgb)
+            cases.append({"normal": list(normal), "recipe": name, "methods": oracles.compared(stack, normal)})
+        note(f"{printer}: normal {number + 1} of {len(normals)}")
+    return cases
+
+
+def lines_of_oracles(cases):
+    lines = ["share of the grain of random choice: mean of the recipes, their worst, and the worst ink alone",
+             f"{'':18}{'cases':>6}" + "".join(f"{'l = %d um' % round(1000 * length):>27}" for length in LENGTHS_MM)
+             + f"{'rms, 1 mm':>12}{'CIEDE2000':>11}"]
+    for method in cases[0]["methods"]:
+        results = [case["methods"][method] for case in cases]
+        shares = [oracles.figures(result) for result in results if result["grain"][0]["share"] is not None]
+        cells = "        -        -        -" * len(LENGTHS_MM)
+        if shares:
+            recipes, inks = np.array(shares, float).swapaxes(0, 1)
+            columns = recipes.mean(axis=0), recipes.max(axis=0), inks.max(axis=0)
+            cells = "".join("".join(f"{value:9.3f}" for value in values) for values in zip(*columns))
+        rms = np.mean([max(result["coverage_rms"].values()) for result in results])
+        lines.append(f"{method:18}{len(shares):6}{cells}{rms:12.6f}"
+                     f"{np.mean([result['de_to_stack'] for result in results]):11.3f}")
     return lines
 
 
@@ -235,10 +267,26 @@ def note(text):
     print(text, file=sys.stderr, flush=True)
 
 
+def run(part, program, printer, arguments):
+    """Returns the cases of a part, and the lines that sum them up."""
+    normals, recipes = NORMALS[:arguments.normals], RECIPES[:arguments.recipes]
+    if part == "grain":
+        cases = study_grain(program, printer, normals, recipes, range(1, arguments.seeds + 1))
+        return cases, lines_of_grain(cases)
+    if part == "accuracy":
+        cases = study_accuracy(program, printer, recipes, arguments.colours)
+        return cases, lines_of_accuracy(cases)
+    if part == "dither":
+        cases = study_dither(program, printer, normals, recipes)
+        return cases, lines_of_dither(cases)
+    cases = study_oracles(program, printer, normals, recipes)
+    return cases, lines_of_oracles(cases)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--program", required=True, help="path of vdbdither")
-    parser.add_argument("--part", action="append", choices=("grain", "accuracy", "dither"), help="by default grain, accuracy")
+    parser.add_argument("--part", action="append", choices=PARTS, help="by default grain, accuracy")
     parser.add_argument("--printer", action="append", help="by default " + " and ".join(PRINTERS))
     parser.add_argument("--normals", type=int, default=len(NORMALS), help="the first N of 20")
     parser.add_argument("--recipes", type=int, default=len(RECIPES), help="the first N of 24")
@@ -247,22 +295,13 @@ def main():
     parser.add_argument("--steps", default=STEPS, help="stages between mesh2sdf and slice-export; the first is the dither")
     parser.add_argument("--json", metavar="FILE", help="writes all cases")
     arguments = parser.parse_args()
-    normals, recipes = NORMALS[:arguments.normals], RECIPES[:arguments.recipes]
     everything = {}
     with tempfile.TemporaryDirectory(prefix="vdbdither-study-") as folder:
         program = Program(arguments.program, folder, arguments.steps)
         for printer in arguments.printer or PRINTERS:
             printer = str(pathlib.Path(printer).resolve()) if printer.endswith(".json") else printer
             for part in arguments.part or ("grain", "accuracy"):
-                if part == "grain":
-                    cases = study_grain(program, printer, normals, recipes, range(1, arguments.seeds + 1))
-                    lines = lines_of_grain(cases)
-                elif part == "accuracy":
-                    cases = study_accuracy(program, printer, recipes, arguments.colours)
-                    lines = lines_of_accuracy(cases)
-                else:
-                    cases = study_dither(program, printer, normals, recipes)
-                    lines = lines_of_dither(cases)
+                cases, lines = run(part, program, printer, arguments)
                 print(f"{part}, {printer}", *lines, "", sep="\n", flush=True)
                 everything.setdefault(printer, {})[part] = cases
     if arguments.json:
