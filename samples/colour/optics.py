@@ -23,7 +23,8 @@ WHITE = XYZ_OF_RGB.sum(axis=1)
 # exp(-r^2 / s^2), here (weight, s in degrees of visual angle); each Gaussian and the sum are scaled to an integral of 1.
 OPPONENT_OF_XYZ = np.array([[278.7336, 721.8031, -106.5520], [-448.7736, 289.8056, 77.1569],
                             [85.9513, -589.9859, 501.1089]]) / 1000
-FILTERS = (((0.921, 0.0283), (0.105, 0.133), (-0.108, 4.336)), ((0.531, 0.0392), (0.330, 0.494)), ((0.488, 0.0536), (0.371, 0.386)))
+FILTERS = (((0.921, 0.0283), (0.105, 0.133), (-0.108, 4.336)), ((0.531, 0.0392), (0.330, 0.494)),
+           ((0.488, 0.0536), (0.371, 0.386)))
 
 VIEWING_DISTANCE_MM = 300
 DROP_SIGMA_MM = 0.025

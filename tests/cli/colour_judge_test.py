@@ -199,8 +199,9 @@ class ColourJudge(ProgramTest):
         self.assertIn("normal", self.judge("small", "--normal", "0,0,0").stderr)
 
     def test_the_study_judges_prints_of_the_program(self):
+        parts = [word for part in study.PARTS for word in ("--part", part)]
         done = subprocess.run(["/usr/bin/python3", COLOUR / "study.py", "--program", PROGRAM, "--normals", "2", "--recipes", "1",
-                               "--colours", "2", "--seeds", "1", "--printer", "mimaki-3duj-553", "--steps",
+                               "--colours", "2", "--seeds", "1", "--printer", "mimaki-3duj-553", *parts, "--steps",
                                "dither ! material-assign --shell 0.1mm:cyan --core white", "--json", "cases.json"],
                               cwd=self.folder, capture_output=True, text=True, timeout=500)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -209,7 +210,11 @@ class ColourJudge(ProgramTest):
         for case in cases["grain"]:
             self.assertAlmostEqual(case["coverage"]["cyan"], 0.1, delta=0.02)
             self.assertEqual(case["grain"][0]["dl"], 0)
-        self.assertIn("random mixtures", done.stdout)
+        self.assertEqual([len(cases[part]) for part in ("dither", "oracles")], [6, 2])
+        for case in cases["oracles"]:
+            self.assertLess(case["methods"]["the stack"]["grain"][1]["share"], case["methods"]["random choice"]["grain"][1]["share"])
+        for text in ("random mixtures", "interlaced", "along the surface"):
+            self.assertIn(text, done.stdout)
 
     def test_what_inks_can_mix_is_known(self):
         colours = np.array([[1, 1, 1], [0.9, 0.1, 0.1], [0.1, 0.9, 0.1], [0.1, 0.1, 0.9], [0.01, 0.01, 0.01]])
