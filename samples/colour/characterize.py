@@ -2,13 +2,13 @@
 """Fits the mixing model of a printer profile to patches whose colour a Monte Carlo walk of light predicts.
 
     samples/colour/characterize.py PROFILE.json OUT.json [--program build/release/vdbdither] [--patches N] [--photons N]
-        [--steps "dither --mask none ! halftone"] [--verify N] [--json FILE]
+        [--steps "dither --mask none ! halftone"] [--negative] [--verify N] [--json FILE]
 
 Each patch is a plate of one colour, printed by the program; without --program, by error diffusion (oracles.py) of random
 coverages. Its upper 1 mm on a white core, together 2 mm, is lit from above and seen from everywhere (monte_carlo.cpp, built
 with g++). OUT gets, for red, green and blue, the "yule_nielsen" and the "linear_rgb" of each material that fit best.
---verify prints colours with OUT, and compares their walks with what was wanted. The table also says how well another model,
-that of Kubelka and Munk (mixing_models.py), fits the same patches.
+--verify prints colours with OUT, and compares their walks with what was wanted. The table also says how well other models
+(mixing_models.py) fit the same patches.
 
 The coefficients of the inks are those that Elek, Sumin, Zhang, Weyrich, Myszkowski, Bickel, Wilkie, Krivanek measured on the
 Vero inks of Stratasys: Scattering-aware Texture Reproduction for 3D Printing, ACM TOG 36(6), 2017: albedo and extinction in
@@ -196,23 +196,28 @@ def walk(press, walker, mixtures):
     return np.array(coverages), results[..., 0], results[..., 1]
 
 
-def characterized(profile, press, walker, patches):
+def characterized(profile, press, walker, patches, negative=False):
     """Returns the fitted profile, a table as lines, and the patches as dictionaries."""
     coverages, reflectances, errors = walk(press, walker, patch_mixtures(len(press.inks), patches))
     covered = coverages.max(axis=0) > 0.05
     seen = coverages[:, covered]
-    n, colours = models.fit_yule_nielsen(seen, reflectances)
+    n, colours = models.fit_yule_nielsen(seen, reflectances, negative)
     everything = np.zeros((len(press.materials), 3))
     everything[covered] = colours
     new = with_model(profile, n, everything, covered)
     before = optics.mixed(coverages, optics.material_colours(press.materials), optics.yule_nielsen(profile))
     lines = [f"{'CIEDE2000 to the walk of light':40}{'cases':>6}{'median':>10}{'95 %':>10}{'worst':>10}",
              line_of("the profile as it was", reflectances, before),
-             line_of("the fitted profile", reflectances, optics.mixed(coverages, everything, n)),
-             line_of("patches that the fit had not seen", reflectances,
-                     models.left_out(seen, reflectances, models.fit_yule_nielsen, models.predict_yule_nielsen)),
-             line_of("the same, of Kubelka and Munk", reflectances,
-                     models.left_out(seen, reflectances, models.fit_kubelka_munk, models.predict_kubelka_munk)),
+             line_of("the fitted profile", reflectances, optics.mixed(seen, colours, n)),
+             "patches that the fit had not seen:"]
+    def any_sign(*rows):
+        return models.fit_yule_nielsen(*rows, negative=True)
+
+    for title, fit, predict in (("  Yule and Nielsen", models.fit_yule_nielsen, models.predict_yule_nielsen),
+                                ("  Yule and Nielsen, n of any sign", any_sign, models.predict_yule_nielsen),
+                                ("  Kubelka and Munk", models.fit_kubelka_munk, models.predict_kubelka_munk)):
+        lines.append(line_of(title, reflectances, models.left_out(seen, reflectances, fit, predict)))
+    lines = [*lines,
              line_of("the standard error of the walk itself", reflectances, reflectances + errors),
              "n: " + " ".join(f"{value:.3f}" for value in n)]
     for entry, colour, known in zip(press.materials, everything, covered):
@@ -241,6 +246,7 @@ def main():
     parser.add_argument("--steps", default="dither --mask none ! halftone", help="stages between mesh2sdf and slice-export")
     parser.add_argument("--patches", type=int, default=150)
     parser.add_argument("--photons", type=int, default=100000, help="for each patch and channel")
+    parser.add_argument("--negative", action="store_true", help="also tries n below 0")
     parser.add_argument("--verify", type=int, default=0, metavar="N", help="colours to print with the result")
     parser.add_argument("--json", metavar="FILE", help="writes the patches")
     arguments = parser.parse_args()
@@ -250,7 +256,7 @@ def main():
         try:
             walker = Walker(folder, arguments.photons)
             press = Press(profile, folder, arguments.program, arguments.steps, pathlib.Path(arguments.profile).resolve())
-            new, lines, cases = characterized(profile, press, walker, arguments.patches)
+            new, lines, cases = characterized(profile, press, walker, arguments.patches, arguments.negative)
             print(*lines, sep="\n", flush=True)
             out.write_text(json.dumps(new, indent=2, ensure_ascii=False) + "\n")
             if arguments.verify:

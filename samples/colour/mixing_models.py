@@ -11,6 +11,7 @@ import optics
 
 # Beyond, the law hardly differs from the geometric mean.
 MOST_YULE_NIELSEN = 20
+LEAST_REFLECTANCE = 1e-5
 OUTER_MIRROR, INNER_MIRROR = 0.04, 0.6
 
 
@@ -36,27 +37,32 @@ def nonnegative(matrix, wanted):
     return solution
 
 
-def fit_yule_nielsen(coverages, reflectances):
+def fit_yule_nielsen(coverages, reflectances, negative=False):
     """Returns n [3] and the colours of the materials [materials, 3] that fit best, by the cube roots of the reflectances.
 
     coverages     [patches, materials]
-    reflectances  [patches, 3]
+    reflectances  [patches, 3], above 0
+    negative      n below 0 is tried too: n = -1 mixes 1 / R, as absorption mixes in a translucent material
     """
     exponents, colours = [], []
     for measured in reflectances.T:
         def at(n):
             # The weight turns a difference of R^(1/n) into one of the cube root of R.
-            weight = n / 3 * measured ** (1 / 3 - 1 / n)
+            weight = abs(n) / 3 * measured ** (1 / 3 - 1 / n)
             roots = nonnegative(coverages * weight[:, None], measured ** (1 / n) * weight)
-            found = np.minimum(roots, 1) ** n
+            found = np.clip(np.maximum(roots, 1e-12) ** n, LEAST_REFLECTANCE, 1)
             return ((np.cbrt(optics.mixed(coverages, found[:, None], n)[:, 0]) - np.cbrt(measured)) ** 2).sum(), found
 
-        grid = np.geomspace(0.5, MOST_YULE_NIELSEN, 60)
-        place = int(np.argmin([at(n)[0] for n in grid]))
-        fine = np.linspace(grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)], 41)
-        n = fine[np.argmin([at(n)[0] for n in fine])]
+        grids = [np.geomspace(0.5, MOST_YULE_NIELSEN, 60)] + ([-np.geomspace(0.5, MOST_YULE_NIELSEN, 60)] if negative else [])
+        tried = []
+        for grid in grids:
+            place = int(np.argmin([at(n)[0] for n in grid]))
+            fine = np.linspace(grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)], 41)
+            n = fine[np.argmin([at(n)[0] for n in fine])]
+            tried.append((*at(n), n))
+        _, found, n = min(tried, key=lambda one: one[0])
         exponents.append(n)
-        colours.append(at(n)[1])
+        colours.append(found)
     return np.array(exponents), np.array(colours).T
 
 

@@ -147,9 +147,10 @@ def table_of_grain(cases):
     head = f"{'':16}{'cases':>6}" + "".join(f"{'l = %d um' % round(1000 * length):>19}" for length in LENGTHS_MM)
     lines = [head, f"{'share of random':22}" + f"{'mean':>11}{'worst':>8}" * len(LENGTHS_MM)]
     rows = {"recipe": [[entry["share"] for entry in case["grain"]] for case in cases if case["grain"][0]["share"] is not None]}
-    for name in cases[0]["coverage"]:
+    # A stack names the materials that it has.
+    for name in sorted({name for case in cases for name in case["coverage"]}):
         rows[name] = [[entry["inks"][name]["share"] for entry in case["grain"]] for case in cases
-                      if LEAST_COVERAGE < case["coverage"][name] < 1 - LEAST_COVERAGE]
+                      if LEAST_COVERAGE < case["coverage"].get(name, 0) < 1 - LEAST_COVERAGE]
     for name, shares in rows.items():
         if shares:
             cells = zip(np.mean(shares, axis=0), np.max(shares, axis=0))
@@ -226,7 +227,8 @@ def lines_of_dither(cases):
     for title in DITHERS:
         rows = [case for case in cases if case["dither"] == title]
         pairs = [(case, plain[tuple(case["normal"]), case["recipe"]]) for case in rows]
-        off = [abs(case["coverage"][name] - other["coverage"][name]) for case, other in pairs for name in case["coverage"]]
+        off = [abs(case["coverage"].get(name, 0) - other["coverage"].get(name, 0)) for case, other in pairs
+               for name in {**case["coverage"], **other["coverage"]}]
         rms = [value for case in rows for value in case["coverage_rms"].values()]
         de = [differences(*(np.array(side["predicted"]["linear_rgb"]) for side in pair)) for pair in pairs]
         lines.append(f"{title:22}{len(rows):6}{np.mean(off):12.6f}{np.max(off):12.6f}{np.mean(rms):12.6f}"

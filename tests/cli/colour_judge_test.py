@@ -212,9 +212,21 @@ class ColourJudge(ProgramTest):
             self.assertEqual(case["grain"][0]["dl"], 0)
         self.assertEqual([len(cases[part]) for part in ("dither", "oracles")], [6, 2])
         for case in cases["oracles"]:
-            self.assertLess(case["methods"]["the stack"]["grain"][1]["share"], case["methods"]["random choice"]["grain"][1]["share"])
+            found, random = (case["methods"][name]["grain"][1]["share"] for name in ("the stack", "random choice"))
+            self.assertLess(found, random)
         for text in ("random mixtures", "interlaced", "along the surface"):
             self.assertIn(text, done.stdout)
+
+    def test_stacks_with_different_materials_share_a_table(self):
+        def case(name, share):
+            entry = {"dl": 1.0, "random_dl": 2.0, "share": share}
+            return {"coverage": {"white": 0.5, name: 0.5}, "recipe": "r", "normal": [0, 0, 1], "coverage_rms": {"white": 0.1},
+                    "grain": [{**entry, "inks": {"white": entry, name: entry}} for _ in judge.LENGTHS_MM]}
+
+        lines = study.lines_of_grain([case("cyan", 0.25), case("black", 0.75)])
+        rows = {line.split()[0]: line.split()[1:4] for line in lines if line.split()[0] in ("recipe", "white", "cyan", "black")}
+        self.assertEqual(rows, {"recipe": ["2", "0.500", "0.750"], "white": ["2", "0.500", "0.750"],
+                                "cyan": ["1", "0.250", "0.250"], "black": ["1", "0.750", "0.750"]})
 
     def test_what_inks_can_mix_is_known(self):
         colours = np.array([[1, 1, 1], [0.9, 0.1, 0.1], [0.1, 0.9, 0.1], [0.1, 0.1, 0.9], [0.01, 0.01, 0.01]])

@@ -100,6 +100,10 @@ class ColourWalk(ProgramTest):
         found_n, found = mixing_models.fit_yule_nielsen(coverages, optics.mixed(coverages, colours, n))
         np.testing.assert_allclose(found_n, n, rtol=0.02)
         np.testing.assert_allclose(found, colours, atol=0.005)
+        n = np.array([1.5, -1, -3])
+        found_n, found = mixing_models.fit_yule_nielsen(coverages, optics.mixed(coverages, colours, n), negative=True)
+        np.testing.assert_allclose(found_n, n, rtol=0.02)
+        np.testing.assert_allclose(found, colours, atol=0.005)
         model = np.random.default_rng(4).uniform(-1, 1, (3, 9))
         reflectances = mixing_models.predict_kubelka_munk(coverages, model)
         again = mixing_models.left_out(coverages, reflectances, mixing_models.fit_kubelka_munk,
@@ -109,9 +113,10 @@ class ColourWalk(ProgramTest):
     def test_a_profile_is_fitted(self):
         profile = ROOT / "samples/printers/mimaki-3duj-553.json"
         done = subprocess.run(["/usr/bin/python3", COLOUR / "characterize.py", profile, "new.json", "--patches", "30",
-                               "--photons", "4000", "--json", "patches.json"], cwd=self.folder, capture_output=True, text=True,
-                              timeout=300)
+                               "--photons", "4000", "--negative", "--json", "patches.json"], cwd=self.folder, capture_output=True,
+                              text=True, timeout=300)
         self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("nan", done.stdout)
         new = json.loads((self.folder / "new.json").read_text())
         old = json.loads(profile.read_text())
         self.assertEqual([entry["name"] for entry in new["materials"]], [entry["name"] for entry in old["materials"]])
@@ -121,6 +126,8 @@ class ColourWalk(ProgramTest):
         self.assertGreater(min(of["white"]), 0.5)
         self.assertGreater(of["cyan"][2], 5 * of["cyan"][0])
         self.assertGreater(of["yellow"][1], 5 * of["yellow"][2])
+        medians = {line[:40].strip(): float(line[46:56]) for line in done.stdout.splitlines() if line.startswith("the ")}
+        self.assertLess(medians["the fitted profile"], medians["the profile as it was"])
         self.assertEqual(len(json.loads((self.folder / "patches.json").read_text())), 30)
 
 
