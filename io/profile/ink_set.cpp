@@ -44,6 +44,23 @@ PrinterProfile printerOf(const Schema& in) {
   return printer == in.metadata.end() ? PrinterProfile() : printerProfileFromJson(printer->second);
 }
 
+/// Gives inks the absorption and scattering of the profile. Without those of an ink that colours,
+/// they all mix by their colours.
+void takeCoefficients(const std::vector<Material>& known, InkSet& set) {
+  for (std::size_t ink = 0; ink < set.inks.size(); ++ink) {
+    const auto same = std::find_if(known.begin(), known.end(), [&](const Material& other) {
+      return other.name == set.inks[ink].name;
+    });
+    if (same != known.end() && same->absorption && same->scattering) {
+      set.inks[ink].absorption = same->absorption;
+      set.inks[ink].scattering = same->scattering;
+    } else if (ink != set.clear) {
+      set.kubelka_munk.reset();
+      return;
+    }
+  }
+}
+
 }  // namespace
 
 InkSet inkSetOf(const InkOptions& options, const Schema& in) {
@@ -71,6 +88,8 @@ InkSet inkSetOf(const InkOptions& options, const Schema& in) {
   if (set.inks.size() == 1 && set.clear)
     throw UsageError("--inks: there must be an ink besides the clear one");
   set.black = options.black;
+  set.kubelka_munk = printerOf(in).kubelka_munk;
+  if (set.kubelka_munk) takeCoefficients(known, set);
   if (!options.icc.empty()) {
     set.table = readIccCoverages(options, set);
   } else if (!options.channels.empty()) {

@@ -32,7 +32,7 @@ class ProfileParser {
     }
     known(json,
           {"name", "title", "source", "pitch_mm", "build_mm", "point_spread_mm", "yule_nielsen",
-           "materials"},
+           "kubelka_munk", "materials"},
           "");
     profile_.name = this->text(json, "name", "");
     if (!json.contains("name")) problems_.emplace_back("there is no name");
@@ -53,6 +53,7 @@ class ProfileParser {
         problems_.emplace_back("yule_nielsen must be a number from 1 to 16, or three of them");
       profile_.yule_nielsen = triple.value_or(profile_.yule_nielsen);
     }
+    if (json.contains("kubelka_munk")) mirror(json["kubelka_munk"]);
     const ordered_json materials = json.value("materials", ordered_json::array());
     if (!materials.is_array()) problems_.emplace_back("materials is no list");
     for (const ordered_json& entry : materials) material(entry);
@@ -119,6 +120,34 @@ class ProfileParser {
     return result;
   }
 
+  void mirror(const ordered_json& entry) {
+    SurfaceMirror& mirror = profile_.kubelka_munk.emplace();
+    constexpr double most = 0.99;
+    if (!entry.is_object()) {
+      problems_.emplace_back("kubelka_munk must be an object with outer and inner");
+      return;
+    }
+    known(entry, {"outer", "inner"}, "kubelka_munk: ");
+    const ordered_json outer = entry.value("outer", ordered_json());
+    const auto inner = numbers(entry.value("inner", ordered_json()), 0, most);
+    if (!outer.is_number() || outer < 0 || outer > most || !inner) {
+      problems_.emplace_back(
+          "kubelka_munk: outer must be a number and inner three, from 0 to 0.99");
+      return;
+    }
+    mirror = {outer, *inner};
+  }
+
+  /// Reads three numbers of a material that are not negative.
+  std::optional<openvdb::Vec3d> coefficients(const ordered_json& entry, const char* key,
+                                             const std::string& where) {
+    constexpr double most = 1e9;
+    if (!entry.contains(key)) return std::nullopt;
+    auto triple = numbers(entry[key], 0, most);
+    if (!triple) problems_.push_back(where + key + " must be three numbers from 0 to 1e9");
+    return triple;
+  }
+
   void material(const ordered_json& entry) {
     const std::string where = "material " + std::to_string(profile_.materials.size() + 1) + ": ";
     Material& material = profile_.materials.emplace_back();
@@ -126,7 +155,9 @@ class ProfileParser {
       problems_.push_back(where + "it is not a JSON object");
       return;
     }
-    known(entry, {"name", "rgba", "linear_rgb"}, where);
+    known(entry, {"name", "rgba", "linear_rgb", "absorption", "scattering"}, where);
+    material.absorption = coefficients(entry, "absorption", where);
+    material.scattering = coefficients(entry, "scattering", where);
     material.name = text(entry, "name", where);
     if (material.name.empty()) problems_.push_back(where + "there is no name");
     if (const auto problem = fileNameProblem(material.name); problem && !material.name.empty())
@@ -152,6 +183,10 @@ class ProfileParser {
   PrinterProfile profile_;
   std::vector<std::string> problems_;
 };
+
+ordered_json tripleOf(const openvdb::Vec3d& numbers) {
+  return {numbers[0], numbers[1], numbers[2]};
+}
 
 PrinterProfile parse(const std::string& text) {
   const ProfileParser parser(text);
@@ -213,15 +248,17 @@ std::string toJson(const PrinterProfile& profile) {
                                profile.point_spread_mm[2]};
   }
   if (profile.yule_nielsen != PrinterProfile().yule_nielsen) {
-    json["yule_nielsen"] = {profile.yule_nielsen[0], profile.yule_nielsen[1],
-                            profile.yule_nielsen[2]};
+    json["yule_nielsen"] = tripleOf(profile.yule_nielsen);
   }
+  if (const auto& mirror = profile.kubelka_munk)
+    json["kubelka_munk"] = {{"outer", mirror->outer}, {"inner", tripleOf(mirror->inner)}};
   json["materials"] = ordered_json::array();
   for (const Material& material : profile.materials) {
     ordered_json& entry = json["materials"].emplace_back(
         ordered_json{{"name", material.name}, {"rgba", material.rgba}});
-    if (const auto& colour = material.linear_rgb)
-      entry["linear_rgb"] = {(*colour)[0], (*colour)[1], (*colour)[2]};
+    if (material.linear_rgb) entry["linear_rgb"] = tripleOf(*material.linear_rgb);
+    if (material.absorption) entry["absorption"] = tripleOf(*material.absorption);
+    if (material.scattering) entry["scattering"] = tripleOf(*material.scattering);
   }
   return jsonText(json);
 }

@@ -2,12 +2,13 @@
 """Fits the mixing model of a printer profile to patches whose colour a Monte Carlo walk of light predicts.
 
     samples/colour/characterize.py PROFILE.json OUT.json [--program build/release/vdbdither] [--patches N] [--photons N]
-        [--steps "dither --mask none ! halftone"] [--negative] [--verify N] [--json FILE]
+        [--changed SEED] [--steps "dither --mask none ! halftone"] [--verify N] [--json FILE]
 
 Each patch is a plate of one colour, printed by the program; without --program, by error diffusion (oracles.py) of random
 coverages. Its upper 1 mm on a white core, together 2 mm, is lit from above and seen from everywhere (monte_carlo.cpp, built
-with g++). OUT gets, for red, green and blue, the "yule_nielsen" and the "linear_rgb" of each material that fit best.
---verify prints colours with OUT, and compares their walks with what was wanted. The table also says how well other models
+with g++). OUT gets what fits best for red, green and blue: "kubelka_munk" with the "absorption" and "scattering" of each
+material, by which the program mixes, and "yule_nielsen" with "linear_rgb", by which it shows colours and mixes fewer than four
+inks. --verify prints colours with OUT, and compares their walks with what was wanted. The table also says how well other models
 (mixing_models.py) fit the same patches.
 
 The coefficients of the inks are those that Elek, Sumin, Zhang, Weyrich, Myszkowski, Bickel, Wilkie, Krivanek measured on the
@@ -87,12 +88,16 @@ class Walker:
         return np.array([line.split() for line in done.stdout.splitlines()], float)
 
 
-def coefficients_of(materials):
-    """Returns [materials, 3, 3] for Walker: isotropic scattering."""
+def coefficients_of(materials, changed=0):
+    """Returns [materials, 3, 3] for Walker: isotropic scattering.
+
+    changed  seed by which every coefficient is multiplied by 0.8 or 1.2 at random; 0 leaves them
+    """
+    factors = np.random.default_rng(changed).choice((0.8, 1.2), (len(materials), 2, 3)) if changed else np.ones((len(materials), 2, 3))
     result = []
-    for entry in materials:
+    for entry, (of_absorption, of_scattering) in zip(materials, factors):
         albedo, extinction = ink_of(entry["name"])
-        result.append(np.stack([extinction * (1 - albedo), extinction * albedo, np.zeros(3)], axis=1))
+        result.append(np.stack([extinction * (1 - albedo) * of_absorption, extinction * albedo * of_scattering, np.zeros(3)], axis=1))
     return np.array(result)
 
 
@@ -121,17 +126,21 @@ def coverages_of(block, count):
 class Press:
     """Makes blocks of wanted colours on the lattice of a profile. Materials are those of the profile, in its order."""
 
-    def __init__(self, profile, folder, program=None, steps=None, profile_path=None):
+    def __init__(self, profile, folder, program=None, steps=None, profile_path=None, changed=0):
         self.profile, self.materials = profile, profile["materials"]
         self.inks = study.inks_of(self.materials)
         self.pitch_mm = np.array([length_mm(text) for text in profile["pitch_mm"]])
         self.program = study.Program(program, folder, steps) if program else None
         self.path = str(profile_path)
+        self.coefficients = coefficients_of(self.materials, changed)
         self.count = 0
 
-    def colours(self):
-        """Returns the linear colours of the inks, and n."""
-        return optics.material_colours(self.materials)[self.inks], optics.yule_nielsen(self.profile)
+    def mixed(self, coverages):
+        """Returns the linear colours [..., 3] that the profile predicts for mixtures [..., inks]."""
+        if "kubelka_munk" in self.profile:
+            model = models.kubelka_munk_of_profile(self.profile, self.inks)
+            return models.predict_kubelka_munk(np.atleast_2d(coverages), model).reshape(*np.shape(coverages)[:-1], 3)
+        return optics.mixed(coverages, optics.material_colours(self.materials)[self.inks], optics.yule_nielsen(self.profile))
 
     def block(self, coverages):
         """Returns the block of a mixture of the inks; with the program, of the colour that the profile predicts for it."""
@@ -142,7 +151,7 @@ class Press:
             shape = [round(length / pitch) for length, pitch in zip((1.6, 1.6, SHELL_MM), self.pitch_mm)][::-1]
             return oracles.diffused(np.ones(shape, bool), everything, oracles.SERIAL)
         stack = self.program.stack(self.path, (0, 0, 1), PATCH_MM, study.place_of(self.count),
-                                   optics.mixed(coverages, *self.colours()))
+                                   self.mixed(coverages))
         index = {entry["name"]: m + 1 for m, entry in enumerate(self.materials)}
         return np.array([0] + [index[entry["name"]] for entry in stack.materials], np.uint8)[block_of(stack)]
 
@@ -172,19 +181,25 @@ def line_of(title, wanted, found):
     return f"{title:40}{len(de):6}{np.median(de):10.3f}{np.percentile(de, 95):10.3f}{de.max():10.3f}"
 
 
-def with_model(profile, n, colours, covered):
-    """Returns the profile with the fitted model; materials that no patch had stay as they were."""
-    materials = [{**entry, "linear_rgb": [round(float(value), 6) for value in colour]} if known else entry
-                 for entry, colour, known in zip(profile["materials"], colours, covered)]
-    note = "linear_rgb and yule_nielsen: fitted to a simulation with the coefficients of Elek et al., ACM TOG 36(6), 2017"
+def with_models(profile, n, colours, kubelka_munk, covered):
+    """Returns the profile with the fitted models; materials that no patch had stay as they were."""
+    def digits(values):
+        return [float(f"{value:.6g}") for value in values]
+
+    mirror, absorption, scattering = models.profile_of_kubelka_munk(kubelka_munk, int(covered.sum()))
+    materials = list(profile["materials"])
+    for place, m in enumerate(np.flatnonzero(covered)):
+        materials[m] = {**materials[m], "linear_rgb": digits(np.clip(colours[m], 0, 1)), "absorption": digits(absorption[place]),
+                        "scattering": digits(scattering[place])}
+    note = "colours of mixtures: fitted to a simulation with the coefficients of Elek et al., ACM TOG 36(6), 2017"
     source = "; ".join(text for text in (profile.get("source"), note) if text)
     return {**profile, "name": profile["name"] + "-simulated", "source": source,
-            "yule_nielsen": [round(float(value), 4) for value in n], "materials": materials}
+            "yule_nielsen": [min(16, max(1, round(float(value), 4))) for value in n], "kubelka_munk": mirror, "materials": materials}
 
 
 def walk(press, walker, mixtures):
     """Returns coverages [patches, materials], reflectances [patches, 3] and their standard errors [patches, 3]."""
-    coefficients, white = coefficients_of(press.materials), white_of(press.materials) + 1
+    coefficients, white = press.coefficients, white_of(press.materials) + 1
     coverages, results = [], []
     for number, mixture in enumerate(mixtures):
         block = press.block(mixture)
@@ -196,19 +211,21 @@ def walk(press, walker, mixtures):
     return np.array(coverages), results[..., 0], results[..., 1]
 
 
-def characterized(profile, press, walker, patches, negative=False):
+def characterized(profile, press, walker, patches):
     """Returns the fitted profile, a table as lines, and the patches as dictionaries."""
     coverages, reflectances, errors = walk(press, walker, patch_mixtures(len(press.inks), patches))
     covered = coverages.max(axis=0) > 0.05
     seen = coverages[:, covered]
-    n, colours = models.fit_yule_nielsen(seen, reflectances, negative)
+    n, colours = models.fit_yule_nielsen(seen, reflectances)
     everything = np.zeros((len(press.materials), 3))
     everything[covered] = colours
-    new = with_model(profile, n, everything, covered)
+    kubelka_munk = models.fit_kubelka_munk(seen, reflectances)
+    new = with_models(profile, n, everything, kubelka_munk, covered)
     before = optics.mixed(coverages, optics.material_colours(press.materials), optics.yule_nielsen(profile))
     lines = [f"{'CIEDE2000 to the walk of light':40}{'cases':>6}{'median':>10}{'95 %':>10}{'worst':>10}",
              line_of("the profile as it was", reflectances, before),
-             line_of("the fitted profile", reflectances, optics.mixed(seen, colours, n)),
+             line_of("fitted: Yule and Nielsen", reflectances, optics.mixed(seen, colours, n)),
+             line_of("fitted: Kubelka and Munk", reflectances, models.predict_kubelka_munk(seen, kubelka_munk)),
              "patches that the fit had not seen:"]
     def any_sign(*rows):
         return models.fit_yule_nielsen(*rows, negative=True)
@@ -233,7 +250,7 @@ def characterized(profile, press, walker, patches, negative=False):
 def verified(press, walker, count):
     """Returns a line: the walks of random colours that `press` prints against the colours that were wanted."""
     mixtures = np.random.default_rng(SEED + 1).dirichlet(np.ones(len(press.inks)), count)
-    wanted = optics.mixed(mixtures, *press.colours())
+    wanted = press.mixed(mixtures)
     _, reflectances, _ = walk(press, walker, mixtures)
     return line_of("wanted colours, printed with the fit", wanted, reflectances)
 
@@ -246,7 +263,8 @@ def main():
     parser.add_argument("--steps", default="dither --mask none ! halftone", help="stages between mesh2sdf and slice-export")
     parser.add_argument("--patches", type=int, default=150)
     parser.add_argument("--photons", type=int, default=100000, help="for each patch and channel")
-    parser.add_argument("--negative", action="store_true", help="also tries n below 0")
+    parser.add_argument("--changed", type=int, default=0, metavar="SEED",
+                        help="multiplies every coefficient of the inks by 0.8 or 1.2 at random")
     parser.add_argument("--verify", type=int, default=0, metavar="N", help="colours to print with the result")
     parser.add_argument("--json", metavar="FILE", help="writes the patches")
     arguments = parser.parse_args()
@@ -255,12 +273,14 @@ def main():
     with tempfile.TemporaryDirectory(prefix="vdbdither-patches-") as folder:
         try:
             walker = Walker(folder, arguments.photons)
-            press = Press(profile, folder, arguments.program, arguments.steps, pathlib.Path(arguments.profile).resolve())
-            new, lines, cases = characterized(profile, press, walker, arguments.patches, arguments.negative)
+            press = Press(profile, folder, arguments.program, arguments.steps, pathlib.Path(arguments.profile).resolve(),
+                          arguments.changed)
+            new, lines, cases = characterized(profile, press, walker, arguments.patches)
             print(*lines, sep="\n", flush=True)
             out.write_text(json.dumps(new, indent=2, ensure_ascii=False) + "\n")
             if arguments.verify:
-                print(verified(Press(new, folder, arguments.program, arguments.steps, out.resolve()), walker, arguments.verify))
+                press = Press(new, folder, arguments.program, arguments.steps, out.resolve(), arguments.changed)
+                print(verified(press, walker, arguments.verify))
         except ValueError as problem:
             raise SystemExit(f"characterize: {problem}")
     if arguments.json:

@@ -110,6 +110,27 @@ def _opaque(coverages, parameters):
     return (1 - OUTER_MIRROR) * (1 - inner) * opaque / (1 - inner * opaque)
 
 
+def profile_of_kubelka_munk(model, materials):
+    """Returns what a printer profile holds of a model: the mirror of the surface, and absorption and scattering [materials, 3].
+
+    Each channel has a unit of its own, in which the largest coefficient is 1.
+    """
+    logarithms = model[:, :2 * materials]
+    scaled = np.exp(logarithms - logarithms.max(axis=1, keepdims=True))
+    inner = 1 / (1 + np.exp(-model[:, -1]))
+    return {"outer": OUTER_MIRROR, "inner": [round(float(share), 6) for share in np.minimum(inner, 0.99)]}, \
+        scaled[:, :materials].T, scaled[:, materials:].T
+
+
+def kubelka_munk_of_profile(profile, inks):
+    """Returns the model [3, 2 materials + 1] of the inks, places in the materials of a printer profile."""
+    def logarithms(key):
+        return np.log(np.maximum([profile["materials"][ink][key] for ink in inks], 1e-12))
+
+    inner = np.clip(profile["kubelka_munk"]["inner"], 1e-9, 0.99)
+    return np.column_stack([logarithms("absorption").T, logarithms("scattering").T, np.log(inner / (1 - inner))])
+
+
 def left_out(coverages, reflectances, fit, predict, parts=5):
     """Returns the colours [patches, 3] that a model predicts for patches from fits to the others."""
     predicted = np.zeros_like(reflectances)

@@ -24,6 +24,21 @@ class Printers(ProgramTest):
         for profile in (ROOT / "samples/printers").iterdir():
             self.assertIn("is a proper profile", self.succeed("printers", "check", profile).decode())
 
+    def test_check_lists_what_is_wrong_with_the_colours_of_a_profile(self):
+        (self.folder / "odd.json").write_text("""{"name": "odd", "pitch_mm": [0.04, 0.08, 0.02], "yule_nielsen": [2, 0.5, 2],
+            "kubelka_munk": {"outer": 2, "inner": [0, 0, 0], "sides": 1}, "materials": [
+            {"name": "white", "rgba": [1, 2, 3, 4], "linear_rgb": [0, 2, 0], "absorption": 1, "scattering": [1, 1, -1]}]}""")
+        done = self.run_program("printers", "check", "odd.json")
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual(done.stdout.decode().splitlines(), [
+            "yule_nielsen must be a number from 1 to 16, or three of them",
+            "kubelka_munk: 'sides' means nothing here",
+            "kubelka_munk: outer must be a number and inner three, from 0 to 0.99",
+            "material 1: absorption must be three numbers from 0 to 1e9",
+            "material 1: scattering must be three numbers from 0 to 1e9",
+            "material 1: linear_rgb must be three numbers from 0 to 1",
+        ])
+
     def test_check_lists_every_problem(self):
         (self.folder / "odd.json").write_text("""{"name": "even", "pitch_mm": ["42um", 0, "22um"], "bild_mm": [1, 2, 3],
             "materials": [{"name": "white", "rgba": [1, 2, 3, 300]}, {"name": "white", "rgba": [1, 2, 3, 4]}]}""")

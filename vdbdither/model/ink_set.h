@@ -23,8 +23,10 @@ struct InkSet {
   std::vector<openvdb::Vec3d> linear_rgb;  ///< of each ink, 0 … 1
   std::optional<std::size_t> clear;        ///< the ink that stands for what is not opaque
   openvdb::Vec3d yule_nielsen{2, 2, 2};    ///< factor n of red, green and blue, 1 … 16
-  double black = 0.5;                      ///< 0: as little black as possible; 1: as much
-  std::optional<CoverageTable> table;      ///< in place of the mixing law
+  /// Where there is one, the inks have absorption and scattering, and mix by these.
+  std::optional<SurfaceMirror> kubelka_munk;
+  double black = 0.5;                  ///< 0: as little black as possible; 1: as much
+  std::optional<CoverageTable> table;  ///< in place of the mixing law
 };
 
 }  // namespace vdbdither

@@ -7,18 +7,18 @@ struct Schema;
 // The grids of a job by name. Houdini and Blender know these names too. docs/vdb-conventions.md
 // lists their types and classes.
 
-inline constexpr const char* surface_grid = "surface";      ///< signed distance, mm; < 0 inside
-inline constexpr const char* normal_grid = "N";             ///< unit outward normal
-inline constexpr const char* closest_grid = "closest";      ///< index of the nearest triangle
-inline constexpr const char* part_grid = "part";            ///< number of the part, from 1
-inline constexpr const char* colour_grid = "Cd";            ///< linear red, green, blue
-inline constexpr const char* opacity_grid = "Alpha";        ///< opacity, 0 … 1
+inline constexpr const char* surface_grid = "surface";       ///< signed distance, mm; < 0 inside
+inline constexpr const char* normal_grid = "N";              ///< unit outward normal
+inline constexpr const char* closest_grid = "closest";       ///< index of the nearest triangle
+inline constexpr const char* part_grid = "part";             ///< number of the part, from 1
+inline constexpr const char* colour_grid = "Cd";             ///< linear red, green, blue
+inline constexpr const char* opacity_grid = "Alpha";         ///< opacity, 0 … 1
 inline constexpr const char* coverage_prefix = "coverage_";  ///< + name: share of a material
-inline constexpr const char* displaced_grid = "displaced";  ///< displaced distance, mm
-inline constexpr const char* solid_grid = "solid";          ///< the printed voxels
-inline constexpr const char* material_grid = "material";    ///< index of the material; 0 is empty
-inline constexpr const char* printed_grid = "printed";      ///< share of material, 0 … 1
-inline constexpr const char* mask_grid = "mask";            ///< a periodic tile of thresholds
+inline constexpr const char* displaced_grid = "displaced";   ///< displaced distance, mm
+inline constexpr const char* solid_grid = "solid";           ///< the printed voxels
+inline constexpr const char* material_grid = "material";     ///< index of the material; 0 is empty
+inline constexpr const char* printed_grid = "printed";       ///< share of material, 0 … 1
+inline constexpr const char* mask_grid = "mask";             ///< a periodic tile of thresholds
 
 // Keys of file metadata.
 

@@ -17,6 +17,16 @@ struct Material {
   /// Measured colour of a full area, linear light with the primaries of Rec. 709, 0 … 1; the
   /// display colour where there is none.
   std::optional<openvdb::Vec3d> linear_rgb = std::nullopt;
+  /// Absorption and scattering of red, green and blue light, ≥ 0, in units that all materials of a
+  /// printer share.
+  std::optional<openvdb::Vec3d> absorption = std::nullopt;
+  std::optional<openvdb::Vec3d> scattering = std::nullopt;
+};
+
+/// How the surface of a print mirrors light, 0 … 1 (Saunderson 1942).
+struct SurfaceMirror {
+  double outer = 0.04;                  ///< share of the light that falls on it from outside
+  openvdb::Vec3d inner{0.6, 0.6, 0.6};  ///< share of the diffuse light from inside, by channel
 };
 
 /// What must be known of a printer before anything is voxelized for it.
@@ -32,6 +42,8 @@ struct PrinterProfile {
   openvdb::Vec3d point_spread_mm{0.0};
   /// Factor n of Yule and Nielsen for red, green and blue: how the colours of materials mix.
   openvdb::Vec3d yule_nielsen{2.0};
+  /// Where there is one, colours mix by the absorption and scattering of the materials instead.
+  std::optional<SurfaceMirror> kubelka_munk;
   std::vector<Material>
       materials;  ///< model materials first to last; support is the printer's own affair
 };

@@ -8,6 +8,8 @@
 #include <optional>
 #include <span>
 
+#include "ops/kernels/colour/kubelka_munk.h"
+#include "ops/kernels/colour/small_matrix.h"
 #include "ops/kernels/colour/table_separation.h"
 #include "vdbdither/model/errors.h"
 
@@ -39,52 +41,6 @@ InkMixture mixtureOf(const InkSet& set, const std::vector<std::size_t>& index) {
   std::vector<Vec3d> linear_rgb;
   for (const std::size_t ink : index) linear_rgb.push_back(set.linear_rgb[ink]);
   return {linear_rgb, set.yule_nielsen};
-}
-
-using Matrix = std::array<std::array<double, 4>, 4>;
-
-/// Inverts the upper left corner of `size` rows. Nothing if it is nearly singular.
-std::optional<Matrix> inverseOf(Matrix matrix, std::size_t size) {
-  constexpr double least_pivot = 1e-7;
-  Matrix inverse{};
-  for (std::size_t n = 0; n < size; ++n) inverse[n][n] = 1;
-  for (std::size_t column = 0; column < size; ++column) {
-    std::size_t pivot = column;
-    for (std::size_t row = column + 1; row < size; ++row)
-      if (std::abs(matrix[row][column]) > std::abs(matrix[pivot][column])) pivot = row;
-    if (std::abs(matrix[pivot][column]) < least_pivot) return std::nullopt;
-    std::swap(matrix[pivot], matrix[column]);
-    std::swap(inverse[pivot], inverse[column]);
-    const double scale = 1 / matrix[column][column];
-    for (std::size_t n = 0; n < size; ++n) {
-      matrix[column][n] *= scale;
-      inverse[column][n] *= scale;
-    }
-    for (std::size_t row = 0; row < size; ++row) {
-      if (row == column) continue;
-      const double factor = matrix[row][column];
-      for (std::size_t n = 0; n < size; ++n) {
-        matrix[row][n] -= factor * matrix[column][n];
-        inverse[row][n] -= factor * inverse[column][n];
-      }
-    }
-  }
-  return inverse;
-}
-
-/// Calls `visit` with every choice of `size` of the numbers below `count`, in rising order.
-template <typename Visit>
-void forEachChoice(std::size_t count, std::size_t size, const Visit& visit) {
-  std::vector<std::size_t> choice(size);
-  std::iota(choice.begin(), choice.end(), std::size_t{0});
-  while (true) {
-    visit(choice);
-    std::size_t place = size;
-    while (place > 0 && choice[place - 1] == count - size + place - 1) --place;
-    if (place == 0) return;
-    ++choice[place - 1];
-    for (std::size_t n = place; n < size; ++n) choice[n] = choice[n - 1] + 1;
-  }
 }
 
 }  // namespace
@@ -260,6 +216,15 @@ double InkSeparation::memoryBytes() const {
 
 std::unique_ptr<Separation> separationInto(const InkSet& set) {
   if (set.table) return std::make_unique<TableSeparation>(set);
+  const std::size_t coloured = set.inks.size() - (set.clear ? 1 : 0);
+  // Four inks mix three channels in one way; fewer mix a part of the colours alone.
+  constexpr std::size_t least = 4;
+  constexpr std::size_t most = 8;
+  if (set.kubelka_munk && coloured >= least && coloured <= most) {
+    InkSet tabled = set;
+    tabled.table = kubelkaMunkTable(set);
+    return std::make_unique<TableSeparation>(tabled);
+  }
   return std::make_unique<InkSeparation>(set);
 }
 
