@@ -14,6 +14,7 @@
 #include "ops/kernels/colour/coverage_reader.h"
 #include "ops/kernels/mask/mask_tile.h"
 #include "ops/kernels/mask/threshold_mask.h"
+#include "ops/kernels/printing/depth_bands.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
@@ -42,6 +43,9 @@ class HalftoneFilter : public Filter {
     inks_.declare(options);
     options.text("core", core_, "NAME",
                  "Material of voxels without a colour; by default the lightest ink");
+    options.text("coat", coat_, "LENGTH:NAME",
+                 "Material over the colours, down to this depth below the printed surface, such as "
+                 "0.1mm:clear");
     options.text("coverages", coverages_, "GRID=NAME,...",
                  "Grids of float that hold the coverages of materials, in place of colours; by "
                  "default the grids coverage_NAME, if there are any");
@@ -74,6 +78,8 @@ class HalftoneFilter : public Filter {
     const std::vector<std::size_t> order = darkestFirst(set_);
     if (core_.empty()) core_ = set_.inks[order.back()].name;
     core_material_ = static_cast<std::int32_t>(indexOf("--core", core_)) + 1;
+    planCoat();
+    lattice_ = in.lattice;
     rest_material_ = rest_.empty() ? std::nullopt : std::optional(indexOf("--rest", rest_));
     halftone_.emplace(order, mask(in.lattice.pitch_mm));
 
@@ -87,7 +93,8 @@ class HalftoneFilter : public Filter {
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
-    std::vector<Read> reads{{solid_grid, Reach::point()}};
+    std::vector<Read> reads{
+        {solid_grid, Reach::stencil(depthReach(coat_band_, lattice_.pitch_mm.z()))}};
     for (const Column& column : columns_) reads.push_back({column.grid, Reach::point()});
     if (!columns_.empty()) return reads;
     reads.push_back({colour_grid, Reach::point()});
@@ -123,6 +130,11 @@ class HalftoneFilter : public Filter {
       const GridCoverages source(std::move(grids), rest_material_);
       material->setTree(halftone_->run(solid->tree(), source, core_material_, in.core));
     }
+    if (!coat_band_.empty()) {
+      const auto coat =
+          valueByDepth(*solid, lattice_.pitch_mm, lattice_.box, in.core, in.valid, coat_band_, 0);
+      takeCoat(material->tree(), coat->tree());
+    }
     return {{material_grid, material}};
   }
 
@@ -133,6 +145,37 @@ class HalftoneFilter : public Filter {
     std::string name;  ///< of the material
     std::size_t material = 0;
   };
+
+  void planCoat() {
+    coat_band_.clear();
+    if (coat_.empty()) return;
+    const std::size_t colon = coat_.find(':');
+    if (colon == std::string::npos)
+      throw UsageError("--coat: '" + coat_ +
+                       "' must be a thickness and a material, as in 0.1mm:clear");
+    double depth_mm = 0;
+    try {
+      depth_mm = parseLengthMm(coat_.substr(0, colon), Range::above(0, 10));
+    } catch (const UsageError& error) {
+      throw UsageError(std::string("--coat: ") + error.what());
+    }
+    const std::size_t material = indexOf("--coat", coat_.substr(colon + 1));
+    coat_band_.push_back({depth_mm, static_cast<std::int32_t>(material) + 1});
+  }
+
+  /// Replaces the voxels of `material` that have a value in `coat`. All of these lie in leaves of
+  /// `coat`, or in tiles of one value.
+  static void takeCoat(openvdb::Int32Tree& material, const openvdb::Int32Tree& coat) {
+    openvdb::tree::ValueAccessor<openvdb::Int32Tree, false> to(material);
+    for (auto value = coat.cbeginValueOn(); value; ++value) {
+      if (*value == 0) continue;
+      if (value.isVoxelValue()) {
+        to.setValue(value.getCoord(), *value);
+      } else {
+        material.fill(value.getBoundingBox(), *value, true);
+      }
+    }
+  }
 
   /// Finds out whether coverages or colours are read.
   void planGrids(const Schema& in) {
@@ -200,6 +243,7 @@ class HalftoneFilter : public Filter {
 
   InkOptions inks_;
   std::string core_;
+  std::string coat_;
   std::string coverages_;
   std::string rest_;
   MaskSource mask_ = MaskSource::blue;
@@ -212,6 +256,8 @@ class HalftoneFilter : public Filter {
   std::unique_ptr<Separation> separation_;
   std::optional<Halftone> halftone_;
   std::int32_t core_material_ = 1;
+  Lattice lattice_;
+  std::vector<DepthBand> coat_band_;  ///< at most one
   std::optional<std::size_t> rest_material_;
 };
 

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <map>
 #include <memory>
 
 #include <gmock/gmock.h>
@@ -5,6 +7,7 @@
 
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
+#include "tests/support/contract.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
@@ -90,6 +93,10 @@ TEST(Halftone, RefusesWhatItCannotDo) {
                 "--inks: 'clear' and 'VeroClear' are both clear; name one of them");
   expectRefusal("halftone", {"--core", "yellow"}, colours,
                 "--core: no ink 'yellow'; there are VeroPureWht VeroBlack VeroClear VeroCyan");
+  expectRefusal("halftone", {"--coat", "clear"}, colours,
+                "--coat: 'clear' must be a thickness and a material, as in 0.1mm:clear");
+  expectRefusal("halftone", {"--coat", "thick:VeroClear"}, colours, "--coat: 'thick' ");
+  expectRefusal("halftone", {"--coat", "1mm:glass"}, colours, "--coat: no ink 'glass'; there are");
   expectRefusal("halftone", {"--rest", "VeroPureWht"}, colours,
                 "--rest: colours have no rest; leave it out");
   expectRefusal("halftone", {"--coverages", "density"}, colours,
@@ -150,6 +157,35 @@ TEST(Halftone, TakesTheCoveragesThatSeparateMakes) {
   EXPECT_GT(used[2], 100);
   EXPECT_GT(used[4], 100);
   EXPECT_EQ(used[3], 0);
+}
+
+TEST(Halftone, ACoatLiesOverTheColours) {
+  Planned planned("halftone", {"--coat", "0.1mm:VeroClear", "--size", "8"});
+  Schema in = schemaWith({"Cd"});
+  in.lattice.box = CoordBBox(Coord(-2), Coord(42));
+  in.grids["solid"] = openvdb::BoolGrid::create(false);
+  planned.filter().plan(in);
+  const CoordBBox part(Coord(0), Coord(39));
+  const auto solid = openvdb::BoolGrid::create(false);
+  solid->fill(part, true, true);
+  const auto colour = Vec3SGrid::create();
+  colour->fill(part, openvdb::Vec3s(0.01F), true);
+  const Grids whole{{"solid", solid}, {"Cd", colour}};
+  const Grids out = planned.filter().run({{-2, 43}, {-2, 43}, whole});
+  const auto material = openvdb::gridConstPtrCast<Int32Grid>(out.at("material"));
+  // Voxels of 50 µm: the two outer layers.
+  for (auto ijk = in.lattice.box.begin(); ijk; ++ijk) {
+    const Coord low = *ijk - part.min();
+    const Coord high = part.max() - *ijk;
+    const int depth = std::min({low.x(), low.y(), low.z(), high.x(), high.y(), high.z()});
+    const std::int32_t found = material->tree().getValue(*ijk);
+    if (depth < 0) {
+      ASSERT_EQ(found, 0) << *ijk;
+    } else {
+      ASSERT_EQ(found == 3, depth < 2) << *ijk << " is " << found;
+    }
+  }
+  EXPECT_EQ(test::firstBreach(planned.filter(), in, whole, 8), "");
 }
 
 TEST(MaterialAssign, HalftonesColoursUnlessTheCommandLineNamesAMaterial) {

@@ -20,10 +20,6 @@ using openvdb::Vec3s;
 
 namespace {
 
-/// How far the aim of a colour that inks cannot mix lies from its grey towards the mean of the
-/// inks, as a share of the way for each unit of saturation. docs/colour.md shows other values.
-constexpr double pull = 0.3;
-
 /// Y of Rec. 709.
 double luminanceOf(const Vec3d& linear_rgb) {
   return 0.2126 * linear_rgb[0] + 0.7152 * linear_rgb[1] + 0.0722 * linear_rgb[2];
@@ -173,7 +169,7 @@ Vec3d InkSeparation::mappedIn(const Vec3d& y, const Vec3d& roots, const Vec3s& l
   if (dimension_ < 2) return grey;
   const double saturation =
       std::max({roots[0], roots[1], roots[2]}) - std::min({roots[0], roots[1], roots[2]});
-  const Vec3d aim = grey + pull * saturation * (mean_ - grey);
+  const Vec3d aim = grey + aim_pull * saturation * (mean_ - grey);
   double kept = 1;
   for (const Affine& side : sides_) {
     const double there = valueAt(side, y);

@@ -21,7 +21,7 @@ namespace vdbdither {
 /// lightness of the colour and lies between the darkest and the lightest ink, so lightness and hue
 /// nearly stay. For saturated colours the aim lies a little towards the mean of the inks, because
 /// the ends of the greys are corners of what can be mixed, where no saturation is left.
-/// docs/colour.md compares this with other ways.
+/// docs/halftone.md compares this with other ways.
 ///
 /// Sources: Lee: Regular triangulations of convex polytopes, in Applied Geometry and Discrete
 /// Mathematics (1991); Morovič: Color Gamut Mapping (2008) on the mapping along lines.

@@ -9,6 +9,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "ops/kernels/colour/separation.h"
 #include "ops/kernels/colour/small_matrix.h"
 
 namespace vdbdither {
@@ -18,8 +19,6 @@ using openvdb::Vec3d;
 namespace {
 
 constexpr int table_edge = 49;
-/// As in InkSeparation.
-constexpr double pull = 0.3;
 /// Coverages that rounding makes negative.
 constexpr double tolerance = 1e-9;
 
@@ -147,7 +146,7 @@ class Inverse {
     const double saturation =
         std::max({roots[0], roots[1], roots[2]}) - std::min({roots[0], roots[1], roots[2]});
     for (double& coverage : aim)
-      coverage += pull * saturation * (1 / static_cast<double>(inks_) - coverage);
+      coverage += aim_pull * saturation * (1 / static_cast<double>(inks_) - coverage);
     return aim;
   }
 

@@ -10,6 +10,11 @@
 
 namespace vdbdither {
 
+/// A colour that the inks cannot mix moves towards an aim: a grey of its lightness, and from there
+/// towards the mean of all inks by this share of the way for each unit of saturation.
+/// docs/halftone.md compares values.
+inline constexpr double aim_pull = 0.5;
+
 /// Inks for colours: how large a share of the voxels each ink of a set gets.
 class Separation {
  public:
@@ -24,6 +29,7 @@ class Separation {
 };
 
 /// Returns the separation into the inks of `set`: by its table if it has one, otherwise by the law
+/// of Kubelka and Munk for four to eight inks that colour and have coefficients, otherwise by that
 /// of Yule and Nielsen (ops/kernels/colour/ink_separation.h). Throws UsageError for a set that has
 /// no ink but the clear one.
 std::unique_ptr<Separation> separationInto(const InkSet& set);

@@ -33,7 +33,7 @@ VoidAndCluster defaultMask();
 
 /// The mask of halftones on a lattice: `exponential` with a length of 70 µm in all directions, or
 /// of the mean pitch where that is longer, and a space weight of 3, in a tile of powers of two, at
-/// least 1.75 mm (16 … 256 voxels) along each axis, seed 1. docs/colour.md gives the reasons.
+/// least 1.75 mm (16 … 256 voxels) along each axis, seed 1. docs/halftone.md gives the reasons.
 VoidAndCluster halftoneMask(const openvdb::Vec3d& pitch_mm);
 
 /// The mask of the paper: 128³, σ = 1.1, `peters`, seed 1.
