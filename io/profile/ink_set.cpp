@@ -88,6 +88,7 @@ InkSet inkSetOf(const InkOptions& options, const Schema& in) {
   if (set.inks.size() == 1 && set.clear)
     throw UsageError("--inks: there must be an ink besides the clear one");
   set.black = options.black;
+  set.media_relative = options.white == White::media;
   set.kubelka_munk = printerOf(in).kubelka_munk;
   if (set.kubelka_munk) takeCoefficients(known, set);
   if (!options.icc.empty()) {

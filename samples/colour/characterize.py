@@ -2,7 +2,7 @@
 """Fits the mixing model of a printer profile to patches whose colour a Monte Carlo walk of light predicts.
 
     samples/colour/characterize.py PROFILE.json OUT.json [--program build/release/vdbdither] [--patches N] [--photons N]
-        [--changed SEED] [--steps "dither --mask none ! halftone"] [--verify N] [--json FILE]
+        [--changed SEED] [--steps "dither --mask none ! halftone --white absolute"] [--verify N] [--json FILE]
 
 Each patch is a plate of one colour, printed by the program; without --program, by error diffusion (oracles.py) of random
 coverages. Its upper 1 mm on a white core, together 2 mm, is lit from above and seen from everywhere (monte_carlo.cpp, built
@@ -260,7 +260,7 @@ def main():
     parser.add_argument("profile", metavar="PROFILE.json")
     parser.add_argument("out", metavar="OUT.json")
     parser.add_argument("--program", help="path of vdbdither; without it, error diffusion prints the patches")
-    parser.add_argument("--steps", default="dither --mask none ! halftone", help="stages between mesh2sdf and slice-export")
+    parser.add_argument("--steps", default="dither --mask none ! halftone --white absolute", help="stages between mesh2sdf and slice-export")
     parser.add_argument("--patches", type=int, default=150)
     parser.add_argument("--photons", type=int, default=100000, help="for each patch and channel")
     parser.add_argument("--changed", type=int, default=0, metavar="SEED",

@@ -2,7 +2,7 @@
 """Studies the colour prints of the program: flat plates of one colour, made, sliced, and judged from their slices.
 
     samples/colour/study.py --program build/release/vdbdither [--part grain|accuracy|dither|oracles]... [--printer NAME]...
-        [--normals N] [--recipes N] [--colours N] [--steps "dither ! halftone"] [--json FILE]
+        [--normals N] [--recipes N] [--colours N] [--steps "dither ! halftone --white absolute"] [--json FILE]
 
 grain     the grain of facets as a share of the grain of random choice (judge.py): 20 normals x 24 recipes
 accuracy  CIEDE2000 between the wanted colour and the one that the counted coverages predict: the ColorChecker, and random
@@ -32,7 +32,7 @@ from printed_stack import read_stack
 
 PARTS = ("grain", "accuracy", "dither", "oracles")
 PRINTERS = ("stratasys-j750-14um", "mimaki-3duj-553")
-STEPS = "dither ! halftone"
+STEPS = "dither ! halftone --white absolute"
 
 COLOURCHECKER = {
     "dark skin": (115, 82, 68), "light skin": (194, 150, 130), "blue sky": (98, 122, 157), "foliage": (87, 108, 67),

@@ -48,7 +48,7 @@ class Halftones(ProgramTest):
 
     def test_the_letter_is_printed_in_its_colours(self):
         self.succeed("mesh2sdf", "part.obj", *PRINTER, "--colour", "!", "dither", "--mask", "none", "!", "halftone", *SMALL_MASK,
-                     "--black", "0", "!", "slice-export", "out")
+                     "--black", "0", "--white", "absolute", "!", "slice-export", "out")
         manifest = json.loads((self.folder / "out/manifest.json").read_text())
         names = [entry["name"] for entry in manifest["materials"]]
         colours = {tuple(entry["rgba"][:3]): index for index, entry in enumerate(manifest["materials"])}

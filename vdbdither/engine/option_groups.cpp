@@ -80,6 +80,7 @@ void InkOptions::declare(Options& options) {
       "black", black, {0, 1},
       "Where colours can be mixed with more or less black: 0 takes as little as possible, "
       "1 as much");
+  options.choice("white", white, whites, "What white is, without --icc");
   options.file(
       "icc", icc, "FILE.icc",
       "ICC output profile that says which inks make up a colour, in place of the mixing of "

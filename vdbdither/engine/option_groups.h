@@ -69,11 +69,19 @@ inline constexpr std::array<Choice<BlackPoint>, 2> black_points{
     {{BlackPoint::compensated, "compensated", "Scales lightness from black to black"},
      {BlackPoint::kept, "kept", "Leaves lightness as it is"}}};
 
-/// `--inks`, `--black`, `--icc` and what belongs to it: which materials make up a colour
+/// What white means to inks.
+enum class White { media, absolute };
+inline constexpr std::array<Choice<White>, 2> whites{
+    {{White::media, "media", "The lightest ink, and black the darkest; colours lie between"},
+     {White::absolute, "absolute",
+      "A perfect white: colours stay as they are where inks can mix them"}}};
+
+/// `--inks`, `--black`, `--white`, `--icc` and what belongs to it: which materials make up a colour
 /// (io/profile/ink_set.h).
 struct InkOptions {
   std::string inks;
   double black = 0.5;
+  White white = White::media;
   std::string icc;
   std::string channels;
   Intent intent = Intent::relative;

@@ -25,7 +25,10 @@ struct InkSet {
   openvdb::Vec3d yule_nielsen{2, 2, 2};    ///< factor n of red, green and blue, 1 … 16
   /// Where there is one, the inks have absorption and scattering, and mix by these.
   std::optional<SurfaceMirror> kubelka_munk;
-  double black = 0.5;                  ///< 0: as little black as possible; 1: as much
+  double black = 0.5;  ///< 0: as little black as possible; 1: as much
+  /// Whether a linear light of 1 means the lightest ink and 0 the darkest; colours as they are
+  /// otherwise.
+  bool media_relative = false;
   std::optional<CoverageTable> table;  ///< in place of the mixing law
 };
 

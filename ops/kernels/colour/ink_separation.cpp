@@ -42,13 +42,18 @@ InkMixture mixtureOf(const InkSet& set, const std::vector<std::size_t>& index) {
 }  // namespace
 
 InkSeparation::InkSeparation(const InkSet& set)
-    : index_(inksThatColour(set)), mixture_(mixtureOf(set, index_)), black_(set.black) {
+    : index_(inksThatColour(set)),
+      mixture_(mixtureOf(set, index_)),
+      black_(set.black),
+      media_relative_(set.media_relative) {
   std::vector<double> lightness;
   for (const std::size_t ink : index_)
     lightness.push_back(rootOf(luminanceOf(set.linear_rgb[ink]), 1 / set.yule_nielsen[1]));
   const auto [dark, light] = std::minmax_element(lightness.begin(), lightness.end());
   dark_ = static_cast<std::size_t>(dark - lightness.begin());
   light_ = static_cast<std::size_t>(light - lightness.begin());
+  dark_colour_ = set.linear_rgb[index_[dark_]];
+  light_colour_ = set.linear_rgb[index_[light_]];
   dark_lightness_ = *dark;
   light_lightness_ = *light;
   findBasis();
@@ -150,8 +155,14 @@ void InkSeparation::findSides(const Triangulation& triangulation) {
 
 void InkSeparation::run(const Vec3s& linear_rgb, std::span<float> coverages) const {
   std::fill(coverages.begin(), coverages.end(), 0.0F);
-  const Vec3d roots = mixture_.rootsOf(linear_rgb);
-  const Vec3d y = mappedIn(flattened(roots), roots, linear_rgb);
+  Vec3s wanted = linear_rgb;
+  if (media_relative_) {
+    for (int channel = 0; channel < 3; ++channel)
+      wanted[channel] = std::clamp(wanted[channel], 0.0F, 1.0F);
+    wanted = Vec3s(betweenInks(Vec3d(wanted), dark_colour_, light_colour_));
+  }
+  const Vec3d roots = mixture_.rootsOf(wanted);
+  const Vec3d y = mappedIn(flattened(roots), roots, wanted);
   add(least_black_, y, 1 - black_, coverages);
   add(most_black_, y, black_, coverages);
 }

@@ -58,8 +58,11 @@ class InkSeparation : public Separation {
   std::vector<std::size_t> index_;  ///< in the set, of every ink but the clear one
   InkMixture mixture_;
   double black_;
+  bool media_relative_;
   std::size_t dark_ = 0;  ///< of the inks without the clear one
   std::size_t light_ = 0;
+  openvdb::Vec3d dark_colour_{0.0};
+  openvdb::Vec3d light_colour_{1.0};
   double dark_lightness_ = 0;
   double light_lightness_ = 1;
   int dimension_ = 0;  ///< of the convex hull, 0 … 3

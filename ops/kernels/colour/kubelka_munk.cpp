@@ -33,7 +33,8 @@ Vec3d rootsOf(const Vec3d& linear_rgb) {
 /// The inverse of the law, one colour after another.
 class Inverse {
  public:
-  explicit Inverse(const InkSet& set) : law_(set), black_(set.black), inks_(law_.inks()) {
+  explicit Inverse(const InkSet& set)
+      : law_(set), black_(set.black), media_relative_(set.media_relative), inks_(law_.inks()) {
     std::vector<double> luminance;
     for (std::size_t ink = 0; ink < inks_; ++ink)
       luminance.push_back(luminanceOf(law_.colourOf(alone(ink))));
@@ -44,8 +45,12 @@ class Inverse {
                   [&](const std::vector<std::size_t>& choice) { choices_.push_back(choice); });
   }
 
-  /// Returns the coverages for a colour given by its roots.
-  [[nodiscard]] std::vector<double> coveragesOf(const Vec3d& roots) const {
+  /// Returns the coverages for linear light.
+  [[nodiscard]] std::vector<double> coveragesOf(const Vec3d& linear_rgb) const {
+    const Vec3d roots =
+        rootsOf(media_relative_ ? betweenInks(linear_rgb, law_.colourOf(alone(dark_)),
+                                              law_.colourOf(alone(light_)))
+                                : linear_rgb);
     if (const auto exact = mixtureOf(roots)) return *exact;
     const std::vector<double> aim = aimOf(roots);
     const Vec3d from = rootsOf(law_.colourOf(aim));
@@ -152,6 +157,7 @@ class Inverse {
 
   KubelkaMunk law_;
   double black_;
+  bool media_relative_;
   std::size_t inks_;
   std::size_t dark_ = 0;
   std::size_t light_ = 0;
@@ -214,10 +220,13 @@ CoverageTable kubelkaMunkTable(const InkSet& set) {
   constexpr auto edge = static_cast<std::size_t>(table_edge);
   table.values.resize(edge * edge * edge * inks);
   tbb::parallel_for(std::size_t{0}, edge * edge, [&](std::size_t row) {
-    const auto root = [](std::size_t node) { return static_cast<double>(node) / (table_edge - 1); };
+    const auto light = [](std::size_t node) {
+      const double root = static_cast<double>(node) / (table_edge - 1);
+      return root * root;
+    };
     for (std::size_t blue = 0; blue < edge; ++blue) {
       const std::vector<double> coverages =
-          inverse.coveragesOf({root(row / edge), root(row % edge), root(blue)});
+          inverse.coveragesOf({light(row / edge), light(row % edge), light(blue)});
       float* node = &table.values[(row * edge + blue) * inks];
       for (std::size_t ink = 0; ink < coverages.size(); ++ink)
         node[inverse.law().indexOf(ink)] = static_cast<float>(coverages[ink]);

@@ -15,6 +15,13 @@ namespace vdbdither {
 /// docs/halftone.md compares values.
 inline constexpr double aim_pull = 0.5;
 
+/// Returns the colour that is wanted of inks for linear light of 0 … 1, between the colours of the
+/// darkest and of the lightest ink (the scaling of black point compensation).
+inline openvdb::Vec3d betweenInks(const openvdb::Vec3d& linear_rgb, const openvdb::Vec3d& dark,
+                                  const openvdb::Vec3d& light) {
+  return dark + linear_rgb * (light - dark);
+}
+
 /// Inks for colours: how large a share of the voxels each ink of a set gets.
 class Separation {
  public:

@@ -128,6 +128,17 @@ TEST(InkSeparation, WhiteAndBlackAreTheLightestAndTheDarkestInkAlone) {
   EXPECT_NEAR(separated(separation, set, {0, 0, 0})[1], 1, 1e-6);
 }
 
+TEST(InkSeparation, LightTintsSurviveWhereWhiteIsThatOfTheInk) {
+  InkSet set = setOf({white, black, cyan, magenta, yellow});
+  set.media_relative = true;
+  const InkSeparation separation(set);
+  EXPECT_NEAR(separated(separation, set, {1, 1, 1})[0], 1, 1e-6);
+  EXPECT_NEAR(separated(separation, set, {0, 0, 0})[1], 1, 1e-6);
+  const Vec3d tint(0.88, 0.85, 0.84);
+  const Vec3d made = mixed(set, separated(separation, set, tint));
+  EXPECT_LT((made - (black + tint * (white - black))).length(), 1e-5);
+}
+
 TEST(InkSeparation, GreysStayGrey) {
   for (const double share_of_black : {0.0, 0.5, 1.0}) {
     const InkSet set = setOf({white, black, cyan, magenta, yellow}, share_of_black);

@@ -139,6 +139,20 @@ TEST(KubelkaMunk, ColoursThatInksCannotMixKeepTheirLightness) {
   EXPECT_GT(coverages[1], 0.98F);
 }
 
+TEST(KubelkaMunk, WhiteCanBeThatOfTheInk) {
+  InkSet set = inks();
+  set.media_relative = true;
+  const auto separation = separationInto(set);
+  std::vector<float> coverages(6);
+  separation->run(openvdb::Vec3s(1.0F), coverages);
+  EXPECT_NEAR(coverages[0], 1, 1e-5);
+  const Vec3d dark = mixed(set, {0, 1, 0, 0, 0, 0});
+  const Vec3d light = mixed(set, {1, 0, 0, 0, 0, 0});
+  const Vec3d tint(0.9, 0.8, 0.78);
+  separation->run(openvdb::Vec3s(tint), coverages);
+  EXPECT_LT(difference(mixed(set, coverages), dark + tint * (light - dark)), 0.01);
+}
+
 TEST(KubelkaMunk, FewerThanFourInksMixByTheirColours) {
   InkSet set = inks();
   set.inks.resize(2);
