@@ -230,8 +230,7 @@ class HalftoneFilter : public Filter {
         throw UsageError("--size: only --mask blue has it; leave it out");
       return ThresholdMask::whiteNoise(static_cast<std::uint64_t>(seed_));
     }
-    VoidAndCluster settings = halftoneMask(pitch_mm);
-    settings.seed = static_cast<std::uint64_t>(seed_);
+    VoidAndCluster settings = halftoneMask(pitch_mm, seed_);
     for (int axis = 0; axis < 3; ++axis)
       if (size_[axis] != 0) settings.size[axis] = size_[axis];
     const auto make = [&] {

@@ -82,13 +82,15 @@ VoidAndCluster defaultMask() {
   return settings;
 }
 
-VoidAndCluster halftoneMask(const openvdb::Vec3d& pitch_mm) {
+VoidAndCluster halftoneMask(const openvdb::Vec3d& pitch_mm, int seed) {
   constexpr double decay_mm = 0.07;
   constexpr double least_tile_mm = 1.75;
   constexpr int least_size = 16;
   constexpr int greatest_size = 256;
   const double mean_mm = (pitch_mm.x() + pitch_mm.y() + pitch_mm.z()) / 3;
+  constexpr std::uint64_t apart = std::uint64_t{1} << 30;
   VoidAndCluster settings;
+  settings.seed = (static_cast<std::uint64_t>(seed) + apart) % (2 * apart);
   settings.kernel.shape = MaskKernel::Shape::exponential;
   settings.kernel.space_weight = 3;
   for (int axis = 0; axis < 3; ++axis) {

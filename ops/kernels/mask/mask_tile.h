@@ -33,8 +33,12 @@ VoidAndCluster defaultMask();
 
 /// The mask of halftones on a lattice: `exponential` with a length of 70 µm in all directions, or
 /// of the mean pitch where that is longer, and a space weight of 3, in a tile of powers of two, at
-/// least 1.75 mm (16 … 256 voxels) along each axis, seed 1. docs/halftone.md gives the reasons.
-VoidAndCluster halftoneMask(const openvdb::Vec3d& pitch_mm);
+/// least 1.75 mm (16 … 256 voxels) along each axis. docs/halftone.md gives the reasons.
+///
+/// `seed` is ≥ 0. The seed of the mask is 2^30 more, modulo 2^31: masks of one seed and of as many
+/// voxels start from one random order and are alike, and a halftone must not follow the mask of the
+/// dither.
+VoidAndCluster halftoneMask(const openvdb::Vec3d& pitch_mm, int seed);
 
 /// The mask of the paper: 128³, σ = 1.1, `peters`, seed 1.
 VoidAndCluster paperMask();

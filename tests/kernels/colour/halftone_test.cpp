@@ -36,7 +36,7 @@ InkSet inks() {
 constexpr ZRange all{-1000, 1000};
 
 ThresholdMask smallMask(const Coord& size) {
-  VoidAndCluster settings = halftoneMask({0.042, 0.084, 0.014});
+  VoidAndCluster settings = halftoneMask({0.042, 0.084, 0.014}, 1);
   settings.size = size;
   return ThresholdMask(*maskOf(settings));
 }

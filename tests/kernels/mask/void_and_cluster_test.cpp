@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
+
+#include "ops/kernels/mask/mask_tile.h"
 
 namespace vdbdither {
 namespace {
@@ -365,6 +368,31 @@ TEST(ToroidalKernel, IsItsDefinitionAndOneAtTheOrigin) {
         }
       }
     }
+  }
+}
+
+/// The correlation coefficient of two masks of equal size.
+double correlation(const std::vector<std::uint32_t>& a, const std::vector<std::uint32_t>& b) {
+  const double mean = (static_cast<double>(a.size()) - 1) / 2;
+  double product = 0;
+  double square = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    product += (a[i] - mean) * (b[i] - mean);
+    square += (a[i] - mean) * (a[i] - mean);
+  }
+  return product / square;
+}
+
+TEST(HalftoneMask, DoesNotFollowTheMaskOfTheDither) {
+  for (const int seed : {0, 1, 7, std::numeric_limits<int>::max()}) {
+    VoidAndCluster shape = defaultMask();
+    shape.seed = static_cast<std::uint64_t>(seed);
+    VoidAndCluster halftone = halftoneMask({0.042, 0.042, 0.042}, seed);
+    shape.size = halftone.size = Coord(16);
+    // Of independent masks the standard deviation is 1/64.
+    EXPECT_LT(std::abs(correlation(voidAndCluster(shape), voidAndCluster(halftone))), 0.07) << seed;
+    halftone.seed = shape.seed;
+    EXPECT_GT(correlation(voidAndCluster(shape), voidAndCluster(halftone)), 0.1) << seed;
   }
 }
 
