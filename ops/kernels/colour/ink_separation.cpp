@@ -35,6 +35,7 @@ std::vector<std::size_t> inksThatColour(const InkSet& set) {
 
 InkMixture mixtureOf(const InkSet& set, const std::vector<std::size_t>& index) {
   std::vector<Vec3d> linear_rgb;
+  linear_rgb.reserve(index.size());
   for (const std::size_t ink : index) linear_rgb.push_back(set.linear_rgb[ink]);
   return {linear_rgb, set.yule_nielsen};
 }

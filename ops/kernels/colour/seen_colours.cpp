@@ -27,9 +27,10 @@ using Sum = std::array<float, 4>;
 
 /// Returns x to the power n for 0 ≤ x ≤ 1 and n ≥ 1, by whole powers and roots.
 double powerOf(double x, double n) {
+  const int whole = static_cast<int>(n);
   double power = 1;
-  for (; n >= 1; --n) power *= x;
-  return n > 0 ? power * rootOf(x, n) : power;
+  for (int factor = 0; factor < whole; ++factor) power *= x;
+  return n > whole ? power * rootOf(x, n - whole) : power;
 }
 
 }  // namespace
