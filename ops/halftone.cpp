@@ -63,7 +63,7 @@ class HalftoneFilter : public Filter {
   Schema plan(const Schema& in) override {
     const auto solid = findGrid<BoolGrid>(in.grids, solid_grid);
     planGrids(in);
-    set_ = inkSetOf(inks_, in);
+    set_ = inkSetOf(inks_, in, inksOfCoverages(in));
     for (Column& column : columns_) column.material = indexOf("--coverages", column.name);
     if (columns_.empty()) {
       separation_ = separationInto(set_);
@@ -183,15 +183,20 @@ class HalftoneFilter : public Filter {
     for (const std::string& entry :
          coverages_.empty() ? std::vector<std::string>{} : commaList(coverages_)) {
       const std::size_t equals = entry.find('=');
-      if (equals == std::string::npos)
+      if (equals == std::string::npos || equals == 0 || equals + 1 == entry.size())
         throw UsageError("--coverages: '" + entry +
                          "' must be a grid and a material, as in density=black");
-      columns_.push_back({entry.substr(0, equals), entry.substr(equals + 1)});
+      const std::string grid = entry.substr(0, equals);
+      if (std::any_of(columns_.begin(), columns_.end(),
+                      [&](const Column& other) { return other.grid == grid; }))
+        throw UsageError("--coverages: '" + grid + "' is there twice");
+      columns_.push_back({grid, entry.substr(equals + 1)});
     }
     if (coverages_.empty()) {
       const std::string prefix = coverage_prefix;
       for (const auto& [name, grid] : in.grids)
-        if (name.starts_with(prefix)) columns_.push_back({name, name.substr(prefix.size())});
+        if (name.starts_with(prefix) && name != prefix)
+          columns_.push_back({name, name.substr(prefix.size())});
     }
     for (const Column& column : columns_) findGrid<FloatGrid>(in.grids, column.grid);
     has_opacity_ = columns_.empty() && in.grids.contains(opacity_grid);
@@ -204,20 +209,23 @@ class HalftoneFilter : public Filter {
       findGrid<Vec3SGrid>(in.grids, colour_grid);
       return;
     }
-    // The inks that the coverages were made for.
-    const auto table = in.metadata.find(materials_key);
-    if (!inks_.inks.empty() || table == in.metadata.end()) return;
-    for (const Material& ink : materialTableFromJson(table->second)) {
-      if (!inks_.inks.empty()) inks_.inks += ",";
-      inks_.inks += ink.name + "=";
-      for (std::size_t channel = 0; channel < ink.rgba.size(); ++channel)
-        inks_.inks += (channel > 0 ? "," : "") + std::to_string(ink.rgba[channel]);
-    }
+  }
+
+  /// The inks that coverages were made for, if the metadata hold all of them.
+  [[nodiscard]] MaterialTable inksOfCoverages(const Schema& in) const {
+    const auto found = in.metadata.find(materials_key);
+    if (columns_.empty() || found == in.metadata.end()) return {};
+    const MaterialTable table = materialTableFromJson(found->second);
+    const bool whole = std::all_of(columns_.begin(), columns_.end(), [&](const Column& column) {
+      return std::any_of(table.begin(), table.end(),
+                         [&](const Material& ink) { return sameName(ink.name, column.name); });
+    });
+    return whole ? table : MaterialTable();
   }
 
   [[nodiscard]] std::size_t indexOf(const std::string& option, const std::string& name) const {
     for (std::size_t ink = 0; ink < set_.inks.size(); ++ink)
-      if (set_.inks[ink].name == name) return ink;
+      if (sameName(set_.inks[ink].name, name)) return ink;
     std::string message = option + ": no ink '" + name + "'; there are";
     for (const Material& ink : set_.inks) message += " " + ink.name;
     throw UsageError(message);

@@ -5,6 +5,7 @@
 
 #include <openvdb/tree/LeafManager.h>
 
+#include "io/profile/ink_set.h"
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
 #include "ops/kernels/leaf/split_tiles.h"
@@ -52,7 +53,7 @@ class MaterialAssign : public Filter {
       throw UsageError("--material, --parts and --shell exclude each other; give one");
     }
     if (material_.empty() && parts_.empty() && shell_.empty() && in.grids.contains(colour_grid) &&
-        in.metadata.contains(printer_key)) {
+        printerMixesColours(in)) {
       colours_ = halftone();
       return colours_->plan(in);
     }
@@ -104,6 +105,12 @@ class MaterialAssign : public Filter {
   }
 
  private:
+  static bool printerMixesColours(const Schema& in) {
+    const auto printer = in.metadata.find(printer_key);
+    return printer != in.metadata.end() &&
+           canMixColours(printerProfileFromJson(printer->second).materials);
+  }
+
   /// The operator that chooses materials for colours, with the defaults of its options.
   [[nodiscard]] std::unique_ptr<Filter> halftone() const {
     std::unique_ptr<Operator> made = findOperator("halftone").make();

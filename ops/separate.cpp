@@ -1,5 +1,6 @@
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "io/profile/ink_set.h"
 #include "io/profile/material_table.h"
@@ -31,6 +32,9 @@ class Separate : public Filter {
     if (has_opacity_ && !set_.clear)
       report().warn("no ink is clear: 'Alpha' is ignored and all is printed opaque");
     Schema out = in;
+    std::erase_if(out.grids, [](const auto& entry) {
+      return std::string_view(entry.first).starts_with(coverage_prefix);
+    });
     for (std::size_t ink = 0; ink < set_.inks.size(); ++ink) {
       const auto grid = FloatGrid::create(0.0F);
       grid->setName(coverageGridOf(set_.inks[ink]));

@@ -2,6 +2,9 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
+
+#include <tbb/task_arena.h>
 
 #include "io/profile/ink_set.h"
 #include "io/profile/material_table.h"
@@ -40,7 +43,7 @@ class Simulate : public Filter {
     box_ = in.lattice.box;
     if (!spread_mm_) spread_mm_ = usualSpreadMm(in);
     spread_.emplace(in.lattice.pitch_mm, *spread_mm_);
-    checkReach(*spread_, "--spread: the droplets would reach", "spread");
+    checkReach(*spread_, 500, "--spread: the droplets would reach", "spread");
     Schema out = in;
     out.grids[printed_grid] = makePrintedGrid(solid->transform());
     if (translucency_mm_) {
@@ -55,6 +58,10 @@ class Simulate : public Filter {
     std::vector<Read> reads{{solid_grid, Reach::stencil(spread_->reach().z())}};
     if (seen_) reads.push_back({material_grid, Reach::stencil(light_->reach().z())});
     return reads;
+  }
+
+  [[nodiscard]] double memoryBytes() const override {
+    return seen_ ? seen_->memoryBytes() * tbb::this_task_arena::max_concurrency() : 0;
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
@@ -75,9 +82,8 @@ class Simulate : public Filter {
   }
 
  private:
-  static void checkReach(const GaussianSpread& spread, const std::string& what,
+  static void checkReach(const GaussianSpread& spread, int furthest, const std::string& what,
                          const std::string& remedy) {
-    constexpr int furthest = 500;
     const openvdb::Coord reach = spread.reach();
     if (std::max({reach.x(), reach.y(), reach.z()}) > furthest)
       throw UsageError(what + " over more than " + std::to_string(furthest) +
@@ -101,9 +107,12 @@ class Simulate : public Filter {
           "--translucency: no table of materials says what colour 'material' has; make "
           "it with halftone or material-assign");
     light_.emplace(in.lattice.pitch_mm, Vec3d(*translucency_mm_));
-    checkReach(*light_, "--translucency: the light would reach", "length");
+    checkReach(*light_, 64, "--translucency: the light would reach", "length");
+    const MaterialTable materials = materialTableFromJson(table->second);
+    std::vector<bool> is_seen;
+    for (const Material& material : materials) is_seen.push_back(!isClear(material));
     seen_.emplace(std::array{light_->weights(0), light_->weights(1), light_->weights(2)},
-                  linearColoursOf(materialTableFromJson(table->second), in), yuleNielsenOf(in));
+                  linearColoursOf(materials, in), is_seen, yuleNielsenOf(in));
   }
 
   std::optional<Vec3d> spread_mm_;

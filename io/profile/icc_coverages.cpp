@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "io/file/whole_file.h"
+#include "io/profile/material_table.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/printable.h"
@@ -50,7 +51,10 @@ Profile linearRgb(cmsContext context) {
 
 Profile outputProfile(const std::string& path, cmsContext context) {
   const std::string shown = "'" + printable(path) + "'";
-  if (!std::filesystem::is_regular_file(path)) throw UsageError("--icc: no such file " + shown);
+  std::error_code none;
+  if (!std::filesystem::exists(path, none)) throw UsageError("--icc: no such file " + shown);
+  if (!std::filesystem::is_regular_file(path, none))
+    throw UsageError("--icc: " + shown + " is not a regular file");
   constexpr std::uint64_t most_bytes = std::uint64_t{1} << 26;
   const std::vector<std::uint8_t> bytes = readWholeFile(path, shown, most_bytes);
   Profile profile(
@@ -125,12 +129,15 @@ std::vector<std::size_t> inksOfChannels(const InkOptions& options, const InkSet&
   std::vector<std::size_t> inks;
   for (const std::string& name : names) {
     const auto ink = std::find_if(set.inks.begin(), set.inks.end(), [&](const Material& material) {
-      return given ? lowerCase(material.name) == lowerCase(name) : isCalled(material.name, name);
+      return given ? sameName(material.name, name) : isCalled(material.name, name);
     });
     if (ink == set.inks.end())
       throw UsageError("--channels: no ink '" + name + "' for a channel of the profile; there are" +
                        namesOf(set));
     const auto index = static_cast<std::size_t>(ink - set.inks.begin());
+    if (index == set.clear)
+      throw UsageError("--channels: '" + ink->name +
+                       "' is clear; a channel must be an ink with a colour");
     if (std::find(inks.begin(), inks.end(), index) != inks.end())
       throw UsageError("--channels: '" + ink->name + "' stands for two channels");
     inks.push_back(index);
@@ -144,7 +151,8 @@ std::size_t restOf(const InkSet& set, const std::vector<std::size_t>& channels) 
   for (std::size_t ink = 0; ink < set.inks.size(); ++ink) {
     if (ink == set.clear || std::find(channels.begin(), channels.end(), ink) != channels.end())
       continue;
-    if (!lightest || set.linear_rgb[ink][1] > set.linear_rgb[*lightest][1]) lightest = ink;
+    if (!lightest || luminanceOf(set.linear_rgb[ink]) >= luminanceOf(set.linear_rgb[*lightest]))
+      lightest = ink;
   }
   if (!lightest)
     throw UsageError(

@@ -13,14 +13,16 @@
 
 namespace vdbdither {
 
-namespace {
-
 bool isClear(const Material& material) {
   std::string name = material.name;
   std::transform(name.begin(), name.end(), name.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return name.find("clear") != std::string::npos;
 }
+
+namespace {
+
+constexpr std::size_t most_inks = 12;
 
 std::vector<Material> namedInks(const std::string& text, const std::vector<Material>& known) {
   std::vector<Material> inks;
@@ -49,7 +51,7 @@ PrinterProfile printerOf(const Schema& in) {
 void takeCoefficients(const std::vector<Material>& known, InkSet& set) {
   for (std::size_t ink = 0; ink < set.inks.size(); ++ink) {
     const auto same = std::find_if(known.begin(), known.end(), [&](const Material& other) {
-      return other.name == set.inks[ink].name;
+      return other.name == set.inks[ink].name && other.rgba == set.inks[ink].rgba;
     });
     if (same != known.end() && same->absorption && same->scattering) {
       set.inks[ink].absorption = same->absorption;
@@ -63,20 +65,27 @@ void takeCoefficients(const std::vector<Material>& known, InkSet& set) {
 
 }  // namespace
 
-InkSet inkSetOf(const InkOptions& options, const Schema& in) {
+bool canMixColours(const std::vector<Material>& materials) {
+  const auto clear = std::count_if(materials.begin(), materials.end(), isClear);
+  return materials.size() <= most_inks && clear <= 1 &&
+         static_cast<std::size_t>(clear) < materials.size();
+}
+
+InkSet inkSetOf(const InkOptions& options, const Schema& in, const std::vector<Material>& usual) {
   InkSet set;
   const std::vector<Material> known = printerOf(in).materials;
   set.yule_nielsen = yuleNielsenOf(in);
-  set.inks = options.inks.empty() ? known : namedInks(options.inks, known);
+  set.inks = !options.inks.empty() ? namedInks(options.inks, known) : usual.empty() ? known : usual;
   if (set.inks.empty())
     throw UsageError(
         "--inks: no printer profile names materials; name them, as in "
         "white,black,cyan,magenta,yellow");
-  constexpr std::size_t most = 12;
-  const std::size_t taken = known.empty() ? most : std::min(known.size(), most);
-  if (set.inks.size() > taken)
+  if (set.inks.size() > most_inks)
+    throw UsageError("--inks: there are " + std::to_string(set.inks.size()) + " materials; name " +
+                     std::to_string(most_inks) + " or fewer");
+  if (!known.empty() && set.inks.size() > known.size())
     throw UsageError("--inks: there are " + std::to_string(set.inks.size()) +
-                     " materials, and the printer takes " + std::to_string(taken));
+                     " materials, and the printer takes " + std::to_string(known.size()));
   set.linear_rgb = linearColoursOf(set.inks, in);
   for (std::size_t ink = 0; ink < set.inks.size(); ++ink) {
     if (!isClear(set.inks[ink])) continue;

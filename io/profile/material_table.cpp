@@ -31,12 +31,6 @@ const std::vector<Material>& usualInks() {
   return inks;
 }
 
-bool sameName(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
-    return std::tolower(x) == std::tolower(y);
-  });
-}
-
 /// A colour of four whole numbers from 0 to 255.
 std::optional<std::array<std::uint8_t, 4>> rgbaOf(const ordered_json& json) {
   std::array<std::uint8_t, 4> rgba{};
@@ -50,6 +44,12 @@ std::optional<std::array<std::uint8_t, 4>> rgbaOf(const ordered_json& json) {
 }
 
 }  // namespace
+
+bool sameName(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
+    return std::tolower(x) == std::tolower(y);
+  });
+}
 
 std::array<std::uint8_t, 4> parseColour(std::string_view text) {
   const UsageError error("'" + std::string(text) +

@@ -23,6 +23,9 @@ MaterialTable materialTableFromJson(const std::string& text);
 /// UsageError.
 std::array<std::uint8_t, 4> parseColour(std::string_view text);
 
+/// Whether two names of materials are the same, case aside.
+bool sameName(std::string_view a, std::string_view b);
+
 /// The entries of a list of materials, which commas part; those between the numbers of a colour do
 /// not.
 std::vector<std::string> materialEntries(const std::string& text);

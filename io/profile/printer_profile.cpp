@@ -158,6 +158,8 @@ class ProfileParser {
     known(entry, {"name", "rgba", "linear_rgb", "absorption", "scattering"}, where);
     material.absorption = coefficients(entry, "absorption", where);
     material.scattering = coefficients(entry, "scattering", where);
+    if (entry.contains("absorption") != entry.contains("scattering"))
+      problems_.push_back(where + "absorption and scattering go together");
     material.name = text(entry, "name", where);
     if (material.name.empty()) problems_.push_back(where + "there is no name");
     if (const auto problem = fileNameProblem(material.name); problem && !material.name.empty())

@@ -27,7 +27,8 @@ class Printers(ProgramTest):
     def test_check_lists_what_is_wrong_with_the_colours_of_a_profile(self):
         (self.folder / "odd.json").write_text("""{"name": "odd", "pitch_mm": [0.04, 0.08, 0.02], "yule_nielsen": [2, 0.5, 2],
             "kubelka_munk": {"outer": 2, "inner": [0, 0, 0], "sides": 1}, "materials": [
-            {"name": "white", "rgba": [1, 2, 3, 4], "linear_rgb": [0, 2, 0], "absorption": 1, "scattering": [1, 1, -1]}]}""")
+            {"name": "white", "rgba": [1, 2, 3, 4], "linear_rgb": [0, 2, 0], "absorption": 1, "scattering": [1, 1, -1]},
+            {"name": "black", "rgba": [1, 2, 3, 4], "absorption": [1, 1, 1]}]}""")
         done = self.run_program("printers", "check", "odd.json")
         self.assertEqual(done.returncode, 1)
         self.assertEqual(done.stdout.decode().splitlines(), [
@@ -37,6 +38,7 @@ class Printers(ProgramTest):
             "material 1: absorption must be three numbers from 0 to 1e9",
             "material 1: scattering must be three numbers from 0 to 1e9",
             "material 1: linear_rgb must be three numbers from 0 to 1",
+            "material 2: absorption and scattering go together",
         ])
 
     def test_check_lists_every_problem(self):

@@ -101,6 +101,10 @@ TEST(Halftone, RefusesWhatItCannotDo) {
                 "--rest: colours have no rest; leave it out");
   expectRefusal("halftone", {"--coverages", "density"}, colours,
                 "--coverages: 'density' must be a grid and a material, as in density=black");
+  expectRefusal("halftone", {"--coverages", "=black"}, colours,
+                "--coverages: '=black' must be a grid and a material");
+  expectRefusal("halftone", {"--coverages", "density=VeroBlack,density=VeroCyan"},
+                schemaWith({"density"}), "--coverages: 'density' is there twice");
   expectRefusal("halftone", {"--coverages", "density=black"}, colours, "no grid 'density'");
   expectRefusal("halftone", {"--coverages", "density=blue"}, schemaWith({"density"}),
                 "--coverages: no ink 'blue'");
@@ -159,6 +163,30 @@ TEST(Halftone, TakesTheCoveragesThatSeparateMakes) {
   EXPECT_EQ(used[3], 0);
 }
 
+TEST(Halftone, TakesTheTableOfTheCoveragesWhereItHasThem) {
+  Schema in = schemaWith({"coverage_VeroBlue 5"});
+  in.metadata[materials_key] =
+      toJson(MaterialTable{{"VeroBlue 5", {0, 0, 200, 255}}, {"white", {255, 255, 255, 255}}});
+  const auto names = [](const Schema& out) {
+    std::string text;
+    for (const Material& ink : materialTableFromJson(out.metadata.at(materials_key)))
+      text += ink.name + " ";
+    return text;
+  };
+  EXPECT_EQ(names(Planned("halftone", small_mask).filter().plan(in)), "VeroBlue 5 white ");
+  in.grids.erase("coverage_VeroBlue 5");
+  in.grids["coverage_VeroCyan"] = FloatGrid::create();
+  EXPECT_EQ(names(Planned("halftone", small_mask).filter().plan(in)),
+            "VeroPureWht VeroBlack VeroClear VeroCyan ");
+}
+
+TEST(Separate, LeavesNoCoveragesOfBefore) {
+  const Schema in = schemaWith({"Cd", "coverage_old"});
+  const Schema out = Planned("separate", {}).filter().plan(in);
+  EXPECT_FALSE(out.grids.contains("coverage_old"));
+  EXPECT_TRUE(out.grids.contains("coverage_VeroCyan"));
+}
+
 TEST(Halftone, ACoatLiesOverTheColours) {
   Planned planned("halftone", {"--coat", "0.1mm:VeroClear", "--size", "8"});
   Schema in = schemaWith({"Cd"});
@@ -195,6 +223,11 @@ TEST(MaterialAssign, HalftonesColoursUnlessTheCommandLineNamesAMaterial) {
     return materialTableFromJson(out.metadata.at(materials_key)).size();
   };
   EXPECT_EQ(materials({}), 4U);
+  Schema clear = colours;
+  PrinterProfile printer = printerProfileFromJson(colours.metadata.at(printer_key));
+  printer.materials = {{"clear", {227, 233, 253, 255}}};
+  clear.metadata[printer_key] = toJson(printer);
+  EXPECT_TRUE(Planned("material-assign", {}).filter().plan(clear).grids.contains("material"));
   EXPECT_EQ(materials({"--material", "black"}), 1U);
   EXPECT_EQ(materials({"--shell", "0.5mm:white", "--core", "black"}), 2U);
 }

@@ -134,7 +134,7 @@ TEST(Simulate, RefusesColoursThatItDoesNotKnow) {
   EXPECT_THAT(plan("50um", block()), ThrowsMessage<DataError>(HasSubstr("no grid 'material'")));
   Schema in = blockOfTwoMaterials();
   EXPECT_THAT(plan("10mm", in),
-              ThrowsMessage<UsageError>("--translucency: the light would reach over more than 500 "
+              ThrowsMessage<UsageError>("--translucency: the light would reach over more than 64 "
                                         "voxels; give a smaller length"));
   in.metadata.erase("vdbdither:materials");
   EXPECT_THAT(plan("50um", in),

@@ -17,6 +17,11 @@ struct CoverageTable {
   std::vector<float> values;  ///< of each node one for each ink, ≥ 0, of sum 1
 };
 
+/// Returns the luminance Y of linear light with the primaries of Rec. 709.
+inline double luminanceOf(const openvdb::Vec3d& linear_rgb) {
+  return 0.2126 * linear_rgb[0] + 0.7152 * linear_rgb[1] + 0.0722 * linear_rgb[2];
+}
+
 /// The materials that colours are made of.
 struct InkSet {
   std::vector<Material> inks;              ///< at least one

@@ -125,7 +125,12 @@ class GridReader : public CoverageReader {
       coverages[*rest_] += static_cast<float>(1 - sum);
       return true;
     }
-    if (sum == 0) refuse(columns_.front().name, "and the other coverages are all 0", offset);
+    if (sum == 0) {
+      std::ostringstream text;
+      text << "the coverages are all 0 at voxel " << at(offset)
+           << "; name the material of such voxels (--rest), or mend the grids";
+      throw DataError(text.str());
+    }
     for (float& coverage : coverages) coverage = static_cast<float>(double{coverage} / sum);
     return true;
   }
@@ -149,10 +154,13 @@ class GridReader : public CoverageReader {
   [[noreturn]] void refuse(const std::string& name, const std::string& what,
                            unsigned offset) const {
     std::ostringstream text;
-    text << "grid '" << name << "' " << what << " at voxel "
-         << origin_ + FloatTree::LeafNodeType::offsetToLocalCoord(offset)
-         << "; coverages must be numbers from 0 to 1, of which one at least is above 0";
+    text << "grid '" << name << "' " << what << " at voxel " << at(offset)
+         << "; coverages must be numbers from 0 to 1";
     throw DataError(text.str());
+  }
+
+  [[nodiscard]] Coord at(unsigned offset) const {
+    return origin_ + FloatTree::LeafNodeType::offsetToLocalCoord(offset);
   }
 
   std::optional<std::size_t> rest_;

@@ -20,6 +20,23 @@ using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using openvdb::Int32Tree;
 
+namespace {
+
+/// Appends the origins of the leaves that active tiles stand for, in the layers `core`.
+void appendTileOrigins(const openvdb::Vec3STree& tree, ZRange core, std::vector<Coord>& origins) {
+  auto tile = tree.cbeginValueOn();
+  tile.setMaxDepth(openvdb::Vec3STree::ValueOnCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    const openvdb::CoordBBox box = tile.getBoundingBox();
+    for (int x = box.min().x(); x <= box.max().x(); x += leaf_layers)
+      for (int y = box.min().y(); y <= box.max().y(); y += leaf_layers)
+        for (int z = box.min().z(); z <= box.max().z(); z += leaf_layers)
+          if (rowWithin(z, core) != 0) origins.emplace_back(x, y, z);
+  }
+}
+
+}  // namespace
+
 Int32Tree::Ptr Halftone::run(const openvdb::BoolTree& solid, const CoverageSource& source,
                              std::int32_t bare, ZRange core) const {
   Int32Tree::Ptr material = valueWhereActive(solid, bare);
@@ -50,7 +67,7 @@ Int32Tree::Ptr Halftone::run(const openvdb::BoolTree& solid, const CoverageSourc
         std::size_t place = 0;
         float sum = coverages[order_[0]];
         while (sum <= threshold && place + 1 < order_.size()) sum += coverages[order_[++place]];
-        while (coverages[order_[place]] == 0) --place;
+        while (place > 0 && coverages[order_[place]] == 0) --place;
         values[voxel.pos()] = static_cast<std::int32_t>(order_[place]) + 1;
       }
     }
@@ -59,10 +76,7 @@ Int32Tree::Ptr Halftone::run(const openvdb::BoolTree& solid, const CoverageSourc
 }
 
 std::vector<std::size_t> darkestFirst(const InkSet& set) {
-  const auto luminance = [&](std::size_t ink) {
-    const openvdb::Vec3d& colour = set.linear_rgb[ink];
-    return 0.2126 * colour[0] + 0.7152 * colour[1] + 0.0722 * colour[2];
-  };
+  const auto luminance = [&](std::size_t ink) { return luminanceOf(set.linear_rgb[ink]); };
   std::vector<std::size_t> order;
   for (std::size_t ink = 0; ink < set.inks.size(); ++ink)
     if (ink != set.clear) order.push_back(ink);
@@ -77,6 +91,7 @@ std::vector<FloatGrid::Ptr> coverageGrids(const openvdb::Vec3SGrid& colour,
                                           ZRange core) {
   std::vector<Coord> origins;
   appendLeafOrigins(colour.tree(), core, origins);
+  appendTileOrigins(colour.tree(), core, origins);
   using Leaf = FloatTree::LeafNodeType;
   std::vector<std::vector<std::unique_ptr<Leaf>>> made(inks);
   for (auto& leaves : made) leaves.resize(origins.size());

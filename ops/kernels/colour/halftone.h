@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "ops/kernels/colour/coverage_reader.h"
@@ -38,8 +39,7 @@ class Halftone {
   ThresholdMask mask_;
 };
 
-/// Returns an order of the inks for Halftone: by rising luminance, and the clear one before the
-/// lightest.
+/// Returns an order of the inks for Halftone: by rising luminance, the clear one before the last.
 std::vector<std::size_t> darkestFirst(const InkSet& set);
 
 /// Returns a grid for each ink of the set: its coverage at the active voxels of `colour` in the

@@ -25,7 +25,7 @@ class InkMixture {
   InkMixture(std::vector<openvdb::Vec3d> linear_rgb, const openvdb::Vec3d& yule_nielsen);
 
   /// Returns the linear light, clipped to 0 … 1, to the power 1/n: in this space colours mix
-  /// linearly. From a table where n is not 2; the error is below 1e-6 above a linear light of 1e-4.
+  /// linearly. From a table where n is not 2; the error is below 5e-6 above a linear light of 1e-4.
   [[nodiscard]] openvdb::Vec3d rootsOf(const openvdb::Vec3s& linear_rgb) const;
 
   /// Returns the same of each ink, without a table.

@@ -20,9 +20,14 @@ using openvdb::Vec3s;
 
 namespace {
 
-/// Y of Rec. 709.
-double luminanceOf(const Vec3d& linear_rgb) {
-  return 0.2126 * linear_rgb[0] + 0.7152 * linear_rgb[1] + 0.0722 * linear_rgb[2];
+/// Returns a number of 0 … 1 that has no relation to those of other indices (Steele, Lea, Flood:
+/// Fast splittable pseudorandom number generators, 2014).
+double randomShare(std::uint64_t index) {
+  std::uint64_t bits = (index + 1) * 0x9E3779B97F4A7C15U;
+  bits = (bits ^ (bits >> 30)) * 0xBF58476D1CE4E5B9U;
+  bits = (bits ^ (bits >> 27)) * 0x94D049BB133111EBU;
+  bits ^= bits >> 31;
+  return std::ldexp(static_cast<double>(bits >> 11), -53);
 }
 
 std::vector<std::size_t> inksThatColour(const InkSet& set) {
@@ -99,9 +104,8 @@ Vec3d InkSeparation::flattened(const Vec3d& roots) const {
 InkSeparation::Triangulation InkSeparation::triangulation(double lift_of_black) const {
   std::vector<double> lift;
   for (const Vec3d& point : points_) {
-    constexpr double golden = 0.6180339887498949;
-    const double turn = golden * static_cast<double>(lift.size());
-    lift.push_back((point - mean_).lengthSqr() + 1e-4 * (turn - std::floor(turn)));
+    constexpr double little = 1e-3;
+    lift.push_back((point - mean_).lengthSqr() + little * randomShare(lift.size()));
   }
   lift[dark_] += lift_of_black;
 
@@ -156,12 +160,10 @@ void InkSeparation::findSides(const Triangulation& triangulation) {
 
 void InkSeparation::run(const Vec3s& linear_rgb, std::span<float> coverages) const {
   std::fill(coverages.begin(), coverages.end(), 0.0F);
-  Vec3s wanted = linear_rgb;
-  if (media_relative_) {
-    for (int channel = 0; channel < 3; ++channel)
-      wanted[channel] = std::clamp(wanted[channel], 0.0F, 1.0F);
-    wanted = Vec3s(betweenInks(Vec3d(wanted), dark_colour_, light_colour_));
-  }
+  Vec3s wanted;
+  for (int channel = 0; channel < 3; ++channel)
+    wanted[channel] = std::clamp(linear_rgb[channel], 0.0F, 1.0F);
+  if (media_relative_) wanted = Vec3s(betweenInks(Vec3d(wanted), dark_colour_, light_colour_));
   const Vec3d roots = mixture_.rootsOf(wanted);
   const Vec3d y = mappedIn(flattened(roots), roots, wanted);
   add(least_black_, y, 1 - black_, coverages);
@@ -225,9 +227,10 @@ double InkSeparation::memoryBytes() const {
 std::unique_ptr<Separation> separationInto(const InkSet& set) {
   if (set.table) return std::make_unique<TableSeparation>(set);
   const std::size_t coloured = set.inks.size() - (set.clear ? 1 : 0);
-  // Four inks mix three channels in one way; fewer mix a part of the colours alone.
+  // Four inks mix three channels in one way; fewer mix a part of the colours alone. Solving the law
+  // for more takes seconds.
   constexpr std::size_t least = 4;
-  constexpr std::size_t most = 8;
+  constexpr std::size_t most = 6;
   if (set.kubelka_munk && coloured >= least && coloured <= most) {
     InkSet tabled = set;
     tabled.table = kubelkaMunkTable(set);

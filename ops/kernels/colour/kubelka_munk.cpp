@@ -18,13 +18,9 @@ using openvdb::Vec3d;
 
 namespace {
 
-constexpr int table_edge = 49;
+constexpr int table_edge = 33;
 /// Coverages that rounding makes negative.
 constexpr double tolerance = 1e-9;
-
-double luminanceOf(const Vec3d& linear_rgb) {
-  return 0.2126 * linear_rgb[0] + 0.7152 * linear_rgb[1] + 0.0722 * linear_rgb[2];
-}
 
 Vec3d rootsOf(const Vec3d& linear_rgb) {
   return {std::sqrt(linear_rgb[0]), std::sqrt(linear_rgb[1]), std::sqrt(linear_rgb[2])};
@@ -187,7 +183,8 @@ Vec3d KubelkaMunk::colourOf(const std::vector<double>& coverages) const {
     if (scattering[channel] == 0) continue;
     const double ratio = absorption[channel] / scattering[channel];
     const double inner = mirror_.inner[channel];
-    const double opaque = 1 + ratio - std::sqrt(ratio * ratio + 2 * ratio);
+    // 1 + q − √(q² + 2q), without the difference of nearly equal numbers.
+    const double opaque = 1 / (1 + ratio + std::sqrt(ratio * ratio + 2 * ratio));
     colour[channel] = (1 - mirror_.outer) * (1 - inner) * opaque / (1 - inner * opaque);
   }
   return colour;

@@ -49,7 +49,7 @@ class KubelkaMunk {
 /// colour that the inks cannot mix moves towards a grey of its own lightness as in InkSeparation,
 /// here in the square roots of linear light.
 ///
-/// At least four inks that are not clear, and at most eight.
+/// At least four inks that are not clear. The time grows with the fourth power of their number.
 CoverageTable kubelkaMunkTable(const InkSet& set);
 
 }  // namespace vdbdither

@@ -36,10 +36,22 @@ double powerOf(double x, double n) {
 }  // namespace
 
 SeenColours::SeenColours(std::array<std::vector<float>, 3> weights,
-                         std::vector<openvdb::Vec3d> linear_rgb, const openvdb::Vec3d& yule_nielsen)
-    : weights_(std::move(weights)), roots_{openvdb::Vec3f(0.0F)}, yule_nielsen_(yule_nielsen) {
+                         std::vector<openvdb::Vec3d> linear_rgb, std::vector<bool> is_seen,
+                         const openvdb::Vec3d& yule_nielsen)
+    : weights_(std::move(weights)),
+      roots_{openvdb::Vec3f(0.0F)},
+      is_seen_(std::move(is_seen)),
+      yule_nielsen_(yule_nielsen) {
   const InkMixture mixture(std::move(linear_rgb), yule_nielsen);
   for (const openvdb::Vec3d& root : mixture.roots()) roots_.emplace_back(root);
+  is_seen_.insert(is_seen_.begin(), false);
+}
+
+double SeenColours::memoryBytes() const {
+  double voxels = 1;
+  for (const std::vector<float>& along : weights_)
+    voxels *= leaf_layers + static_cast<double>(along.size());
+  return 2 * voxels * sizeof(Sum);
 }
 
 /// Makes leaves, one after another. For one thread.
@@ -88,7 +100,9 @@ class SeenColours::Painter {
         for (int z = low.z(); z < low.z() + size_.z(); ++z, ++place) {
           if (!valid_.contains(z)) continue;
           const std::int32_t number = material_.getValue(Coord(x, y, z));
-          if (number < 1 || static_cast<std::size_t>(number) >= seen_.roots_.size()) continue;
+          if (number < 1 || static_cast<std::size_t>(number) >= seen_.roots_.size() ||
+              !seen_.is_seen_[static_cast<std::size_t>(number)])
+            continue;
           const openvdb::Vec3f& root = seen_.roots_[static_cast<std::size_t>(number)];
           sums_[place] = {root[0], root[1], root[2], 1};
         }

@@ -17,9 +17,13 @@ class SeenColours {
  public:
   /// @param weights       along each axis, of the voxels from −reach to +reach (GaussianSpread)
   /// @param linear_rgb    of every material, 0 … 1
+  /// @param is_seen       of every material: whether it has a colour; what is clear has none
   /// @param yule_nielsen  factor n of red, green and blue
   SeenColours(std::array<std::vector<float>, 3> weights, std::vector<openvdb::Vec3d> linear_rgb,
-              const openvdb::Vec3d& yule_nielsen);
+              std::vector<bool> is_seen, const openvdb::Vec3d& yule_nielsen);
+
+  /// Bytes that a thread of `run` holds.
+  [[nodiscard]] double memoryBytes() const;
 
   /// Returns linear red, green and blue at the voxels of the leaves of `where` in the layers `core`
   /// that have printed voxels around them, printed or not.
@@ -34,6 +38,7 @@ class SeenColours {
 
   std::array<std::vector<float>, 3> weights_;
   std::vector<openvdb::Vec3f> roots_;  ///< by number; the first is of empty voxels
+  std::vector<bool> is_seen_;          ///< by number
   openvdb::Vec3d yule_nielsen_;
 };
 

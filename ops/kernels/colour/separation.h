@@ -29,14 +29,14 @@ class Separation {
 
   /// Sets `coverages`, one for each ink of the set: ≥ 0, of sum 1 to 1e-6, and 0 for the clear ink.
   /// Depends continuously on the colour. Safe to call from many threads.
-  /// @param linear_rgb  finite; negative values count as 0
+  /// @param linear_rgb  finite; values outside 0 … 1 are clipped
   virtual void run(const openvdb::Vec3s& linear_rgb, std::span<float> coverages) const = 0;
 
   [[nodiscard]] virtual double memoryBytes() const = 0;
 };
 
 /// Returns the separation into the inks of `set`: by its table if it has one, otherwise by the law
-/// of Kubelka and Munk for four to eight inks that colour and have coefficients, otherwise by that
+/// of Kubelka and Munk for four to six inks that colour and have coefficients, otherwise by that
 /// of Yule and Nielsen (ops/kernels/colour/ink_separation.h). Throws UsageError for a set that has
 /// no ink but the clear one.
 std::unique_ptr<Separation> separationInto(const InkSet& set);

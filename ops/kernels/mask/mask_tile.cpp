@@ -87,6 +87,8 @@ VoidAndCluster halftoneMask(const openvdb::Vec3d& pitch_mm, int seed) {
   constexpr double least_tile_mm = 1.75;
   constexpr int least_size = 16;
   constexpr int greatest_size = 256;
+  constexpr int most_voxels = 1 << 19;
+  constexpr double most_pitches = 3.5;
   const double mean_mm = (pitch_mm.x() + pitch_mm.y() + pitch_mm.z()) / 3;
   constexpr std::uint64_t apart = std::uint64_t{1} << 30;
   VoidAndCluster settings;
@@ -94,9 +96,17 @@ VoidAndCluster halftoneMask(const openvdb::Vec3d& pitch_mm, int seed) {
   settings.kernel.shape = MaskKernel::Shape::exponential;
   settings.kernel.space_weight = 3;
   for (int axis = 0; axis < 3; ++axis) {
-    settings.kernel.sigma[axis] = std::max(decay_mm, mean_mm) / pitch_mm[axis];
+    settings.kernel.sigma[axis] =
+        std::clamp(decay_mm, mean_mm, most_pitches * mean_mm) / pitch_mm[axis];
     int& size = settings.size[axis] = least_size;
     while (size < greatest_size && size * pitch_mm[axis] < least_tile_mm) size *= 2;
+  }
+  openvdb::Coord& size = settings.size;
+  while (size.x() * size.y() * size.z() > most_voxels) {
+    int longest = 0;
+    for (int axis = 1; axis < 3; ++axis)
+      if (size[axis] * pitch_mm[axis] > size[longest] * pitch_mm[longest]) longest = axis;
+    size[longest] /= 2;
   }
   return settings;
 }

@@ -32,8 +32,9 @@ openvdb::FloatGrid::Ptr maskOf(const VoidAndCluster& settings,
 VoidAndCluster defaultMask();
 
 /// The mask of halftones on a lattice: `exponential` with a length of 70 µm in all directions, or
-/// of the mean pitch where that is longer, and a space weight of 3, in a tile of powers of two, at
-/// least 1.75 mm (16 … 256 voxels) along each axis. docs/halftone.md gives the reasons.
+/// of 1 to 3.5 times the mean pitch where 70 µm lie outside of that, and a space weight of 3. The
+/// tile has powers of two, at least 1.75 mm (16 … 256 voxels) along each axis, but no more than
+/// 2^19 voxels. docs/halftone.md gives the reasons.
 ///
 /// `seed` is ≥ 0. The seed of the mask is 2^30 more, modulo 2^31: masks of one seed and of as many
 /// voxels start from one random order and are alike, and a halftone must not follow the mask of the

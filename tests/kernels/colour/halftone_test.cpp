@@ -186,14 +186,13 @@ TEST(GridCoverages, RefusesWhatIsNoCoverage) {
     reader->visit(Coord(0));
     reader->read(openvdb::FloatTree::LeafNodeType::coordToOffset(Coord(1, 2, 3)), coverages);
   };
-  const std::string advice =
-      " at voxel [1, 2, 3]; coverages must be numbers from 0 to 1, of which one at least is above "
-      "0";
+  const std::string advice = " at voxel [1, 2, 3]; coverages must be numbers from 0 to 1";
   EXPECT_THAT([&] { refusal(-0.5F); }, ThrowsMessage<DataError>("grid 'ink' is -0.5" + advice));
   EXPECT_THAT([&] { refusal(std::nanf("")); },
               ThrowsMessage<DataError>("grid 'ink' is nan" + advice));
   EXPECT_THAT([&] { refusal(0); },
-              ThrowsMessage<DataError>("grid 'ink' and the other coverages are all 0" + advice));
+              ThrowsMessage<DataError>("the coverages are all 0 at voxel [1, 2, 3]; name the "
+                                       "material of such voxels (--rest), or mend the grids"));
 }
 
 TEST(ColourCoverages, RefusesColoursThatAreNotNumbers) {
@@ -211,6 +210,16 @@ TEST(ColourCoverages, RefusesColoursThatAreNotNumbers) {
       },
       ThrowsMessage<DataError>(
           "grid 'Cd' has a colour that is not a number at voxel [4, 0, 9]; mend the grid"));
+}
+
+TEST(CoverageGrids, HaveTheVoxelsOfTiles) {
+  const InkSet set = inks();
+  const InkSeparation separation(set);
+  const auto colour = openvdb::Vec3SGrid::create();
+  colour->tree().addTile(1, Coord(8, 0, 0), openvdb::Vec3s(0.3F), true);
+  const auto grids =
+      coverageGrids(*colour, ColourCoverages(*colour, nullptr, set, separation), 6, {2, 8});
+  for (const auto& grid : grids) EXPECT_EQ(grid->activeVoxelCount(), 8U * 8 * 6);
 }
 
 TEST(CoverageGrids, HoldWhatTheHalftoneReads) {

@@ -112,6 +112,30 @@ TEST(InkSeparation, IsExactForEveryColourThatTheInksMix) {
   }
 }
 
+TEST(InkSeparation, IsExactForInksAtTheCornersOfACube) {
+  std::mt19937 random(9);
+  RandomMixtures mixtures(10);
+  for (int run = 0; run < 400; ++run) {
+    std::vector<Vec3d> corners;
+    for (int corner = 0; corner < 8; ++corner)
+      corners.emplace_back(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
+    std::shuffle(corners.begin(), corners.end(), random);
+    corners.resize(2 + random() % 7);
+    const InkSet set = setOf(corners, 0.5 * static_cast<double>(random() % 3));
+    const InkSeparation separation(set);
+    // Inks in one line are mixed by lightness.
+    if (corners.size() == 2) continue;
+    for (int i = 0; i < 20; ++i) {
+      const Vec3d wanted = mixed(set, mixtures(corners.size()));
+      const std::vector<float> coverages = separated(separation, set, wanted);
+      expectCoverages(coverages);
+      ASSERT_LT((mixed(set, coverages) - wanted).length(), 2e-5) << "run " << run;
+    }
+    for (std::size_t ink = 0; ink < corners.size(); ++ink)
+      ASSERT_NEAR(separated(separation, set, corners[ink])[ink], 1, 1e-5) << "run " << run;
+  }
+}
+
 TEST(InkSeparation, GivesCoveragesForEveryColour) {
   const InkSet set = setOf({white, black, cyan, magenta, yellow});
   const InkSeparation separation(set);

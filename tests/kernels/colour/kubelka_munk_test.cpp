@@ -88,6 +88,23 @@ TEST(KubelkaMunk, TheLawAndItsInverseAgree) {
   }
 }
 
+TEST(KubelkaMunk, InksMayAbsorbNearlyEverything) {
+  InkSet set = inks();
+  set.inks[1].absorption = Vec3d(2e8);
+  set.inks[1].scattering = Vec3d(1.0);
+  const auto separation = separationInto(set);
+  std::vector<float> coverages(6);
+  for (const float light : {0.0F, 0.01F, 0.2F, 0.9F}) {
+    separation->run(openvdb::Vec3s(light), coverages);
+    double sum = 0;
+    for (const float coverage : coverages) {
+      EXPECT_GE(coverage, 0);
+      sum += double{coverage};
+    }
+    EXPECT_NEAR(sum, 1, 1e-6);
+  }
+}
+
 TEST(KubelkaMunk, TheTableMixesTheColoursThatTheInksCanMix) {
   for (const double share_of_black : {0.0, 0.5, 1.0}) {
     const InkSet set = inks(share_of_black);

@@ -42,8 +42,8 @@ openvdb::FloatGrid::Ptr everywhere() {
 TEST(SeenColours, AreTheMeansOfThePrintedVoxelsAround) {
   const Vec3d n(1, 2, 2.6);
   const auto material = speckled();
-  const auto grid =
-      SeenColours(weights(0.05), colours, n).run(*material, *everywhere(), {2, 31}, {2, 31});
+  const auto grid = SeenColours(weights(0.05), colours, {true, true, true}, n)
+                        .run(*material, *everywhere(), {2, 31}, {2, 31});
   const auto w = weights(0.05);
   const auto reach = [&](std::size_t axis) { return static_cast<int>(w[axis].size() / 2); };
   int checked = 0;
@@ -78,7 +78,7 @@ TEST(SeenColours, AreTheMeansOfThePrintedVoxelsAround) {
 TEST(SeenColours, OneMaterialShowsItsColour) {
   const auto material = openvdb::Int32Grid::create(0);
   material->tree().fill(box, 2, true);
-  const auto grid = SeenColours(weights(0.1), colours, Vec3d(2.0))
+  const auto grid = SeenColours(weights(0.1), colours, {true, true, true}, Vec3d(2.0))
                         .run(*material, *everywhere(), {2, 31}, {2, 31});
   for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel)
     for (int channel = 0; channel < 3; ++channel)
@@ -88,7 +88,7 @@ TEST(SeenColours, OneMaterialShowsItsColour) {
 
 TEST(SeenColours, DoNotDependOnSlabs) {
   const auto material = speckled();
-  const SeenColours seen(weights(0.03), colours, Vec3d(2.0));
+  const SeenColours seen(weights(0.03), colours, {true, true, true}, Vec3d(2.0));
   const auto whole = seen.run(*material, *everywhere(), {0, 32}, {0, 32});
   const int reach = static_cast<int>(weights(0.03)[2].size() / 2);
   for (int begin = 0; begin < 32; begin += 8) {
@@ -99,6 +99,17 @@ TEST(SeenColours, DoNotDependOnSlabs) {
       ASSERT_EQ(slab->tree().getValue(voxel.getCoord()), *voxel);
     }
   }
+}
+
+TEST(SeenColours, WhatIsClearHasNoColour) {
+  const auto material = openvdb::Int32Grid::create(0);
+  for (auto ijk = box.begin(); ijk; ++ijk)
+    material->tree().setValue(*ijk, ((*ijk).x() + (*ijk).y() + (*ijk).z()) % 2 == 0 ? 1 : 2);
+  const auto grid = SeenColours(weights(0.05), colours, {false, true, true}, Vec3d(2.0))
+                        .run(*material, *everywhere(), {2, 31}, {2, 31});
+  for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel)
+    for (int channel = 0; channel < 3; ++channel)
+      ASSERT_NEAR((*voxel)[channel], colours[1][channel], 1e-5);
 }
 
 }  // namespace
