@@ -1,5 +1,6 @@
 #include "vdbdither/program/ending.h"
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -8,6 +9,7 @@
 #include <new>
 #include <poll.h>
 #include <string>
+#include <sys/uio.h>
 #include <system_error>
 #include <thread>
 #include <unistd.h>
@@ -43,26 +45,36 @@ bool isEnding(int code) {
 /// Ends the program; as another thread was about to, if it does not come to its end.
 [[noreturn]] void endNow(const char* message, int code) {
   if (isEnding(code)) printLastLine(message);
-  StagedOutput::abandonAll(patience_with_writes);
+  try {
+    StagedOutput::abandonAll(patience_with_writes);
+  } catch (...) {  // NOLINT(bugprone-empty-catch): memory is out, and the program ends
+  }
   ::_exit(ending_code);
 }
 
 [[noreturn]] void endTerminated() {
-  std::string message = "the program failed";
+  const char* message = "the program failed";
+  std::string text;
+  // Where memory is out, there may be none for a text either.
+  constexpr const char* out_of_memory = "out of memory; try a smaller --slab or fewer --layers";
   try {
-    if (std::current_exception()) throw;
-  } catch (const std::bad_alloc&) {
-    message = "out of memory; try a smaller --slab or fewer --layers";
-  } catch (const std::system_error& error) {
-    message = refusedThread(error.code());
-  } catch (const Error& error) {
-    message = printable(error.what());
-  } catch (const std::exception& error) {
-    message = printable(unexpectedText(error));
+    try {
+      if (std::current_exception()) throw;
+    } catch (const std::bad_alloc&) {
+      message = out_of_memory;
+    } catch (const std::system_error& error) {
+      text = refusedThread(error.code());
+    } catch (const Error& error) {
+      text = printable(error.what());
+    } catch (const std::exception& error) {
+      text = printable(unexpectedText(error));
+    } catch (...) {
+    }
   } catch (...) {
+    message = out_of_memory;
   }
   claimEnding(1);
-  endNow(message.c_str(), 1);
+  endNow(text.empty() ? message : text.c_str(), 1);
 }
 
 [[noreturn]] void endOnInterrupt() {
@@ -88,10 +100,15 @@ void claimEnding(int code) {
 }
 
 void printLastLine(const char* message) {
-  std::string line = std::string("vdbdither: ") + message + "\n";
-  if (::isatty(STDERR_FILENO)) line.insert(0, "\r\033[K");  // over the line of progress
+  const auto part = [](const char* text) {
+    return iovec{const_cast<char*>(text), std::strlen(text)};
+  };
+  // Over the line of progress. Without a string: memory may be out.
+  const char* clear = ::isatty(STDERR_FILENO) ? "\r\033[K" : "";
+  const std::array<iovec, 4> line{part(clear), part("vdbdither: "), part(message), part("\n")};
   pollfd output{STDERR_FILENO, POLLOUT, 0};
-  if (::poll(&output, 1, 0) == 1) (void)!::write(STDERR_FILENO, line.data(), line.size());
+  if (::poll(&output, 1, 0) == 1)
+    (void)!::writev(STDERR_FILENO, line.data(), static_cast<int>(line.size()));
 }
 
 void watchForInterrupts() { startThread(endOnInterrupt); }
