@@ -202,7 +202,7 @@ def lines_of_accuracy(cases):
     return lines
 
 
-DITHERS = {"dither": ("dither", ()), "no dither": ("dither --mask none", ()), "interlaced": ("interlace", ("--refine-y", "2"))}
+DITHERS = {"dither": ("dither", ()), "no dither": ("dither --mask none", ()), "interlaced": ("interlace", ())}
 
 
 def study_dither(program, printer, normals, recipes):
