@@ -15,8 +15,10 @@ by index     the correlation of the thresholds in the order of the random start 
 product      voxels that both masks select: their share, and their power below LOW relative to that at OFFSETS other offsets, to
              that with the thresholds of the dither shuffled, and the power of the halftone mask alone relative to the latter
 
-The last two rows are controls, which must be found: a mask with a little of the halftone mask in noise, and one that equals it
-in one half layer.
+The pairs are those of the options `--seed` of `halftone` and `dither`. The program takes another seed for the mask of `halftone`
+than `--seed` says (SEED_OF_MASK), because masks of one seed and of as many voxels start from one random order; "equal" are pairs
+whose masks have one seed. The last two rows are controls, which must be found: a mask with a little of the halftone mask in
+noise, and one that equals it in one half layer.
 """
 
 import argparse
@@ -30,8 +32,9 @@ from tiles import LATTICES_MM, SHAPE_SIZE, halftone_tile, shape_tile
 # The tile of `halftone` is 64 x 32 x 128 on those of the printers and as large as that of `dither` on these.
 LATTICES = LATTICES_MM | {"cubes of 42 um": (0.042, 0.042, 0.042)}
 LEVELS = (0.1, 0.25, 0.5, 0.75)
-HALFTONE_SEEDS = (1, 2, 3, 4)
-SHAPE_SEEDS = (1, 2, 3, 4)
+SEEDS = (1, 2, 3)
+# `halftone` adds this to --seed for its mask.
+SEED_OF_MASK = 2**30
 # Cycles / mm. The eye sees few above 5 at 30 cm. No lattice reaches less far than the last band.
 BANDS = np.arange(0, 21, 2)
 LOW = 4
@@ -114,27 +117,39 @@ def products(halftone, shape, pitch):
 
 
 def controls(halftone, pitch):
-    """Returns what the comparison says of masks that do depend on the halftone mask."""
+    """Returns two masks of the size of that of `dither` that do depend on the halftone mask, by name."""
     rng = np.random.default_rng(SEED)
     repeated, _ = on_common_period(halftone, np.empty(SHAPE_SIZE, bool))
     noisy, planted = rng.random(SHAPE_SIZE, np.float32), rng.random(SHAPE_SIZE, np.float32)
     noisy += 0.05 * repeated[tuple(map(slice, SHAPE_SIZE))]
     planted[:, :HALF, 0] = repeated[:SHAPE_SIZE[0], :HALF, 0]
-    return {"a little in noise": compare(halftone, noisy, pitch), "one half layer": compare(halftone, planted, pitch)}
+    return {"a little in noise": noisy, "one half layer": planted}
+
+
+def study(program, folder, pitch, shapes):
+    """Returns the figures of a lattice. shapes: the masks of `dither` by seed."""
+    tiles, equal = ({seed: halftone_tile(program, folder, pitch, seed + added) for seed in SEEDS} for added in (SEED_OF_MASK, 0))
+    pairs = {f"{a}, {b}": (tiles[a], shapes[b]) for a in SEEDS for b in SEEDS}
+    pairs |= {f"equal, {seed}": (equal[seed], shapes[seed]) for seed in SEEDS}
+    pairs |= {name: (tiles[1], mask) for name, mask in controls(tiles[1], pitch).items()}
+    return rounded({"pairs": {name: compare(*pair, pitch) for name, pair in pairs.items()},
+                    "products": {name: products(*pairs[name], pitch) for name in ("1, 1", "equal, 1")}})
 
 
 def lines_of(lattice, result):
     heads = "".join(f"{f'< {level:g}':>7}" for level in LEVELS)
     lines = [lattice, f"{'seeds of halftone, dither':26}{'correlation':>12}{'score':>7}{heads}"
              f"{'greatest':>10}{'bands':>7}{'halves':>8}{'rms':>6}{'by index':>10}"]
-    for name, figures in (result["pairs"] | result["controls"]).items():
+    for name, figures in result["pairs"].items():
         columns = [figures["grey"], *(figures[f"below {level:g}"] for level in LEVELS)]
         scores = "".join(f"{entry['score']:7.2f}" for entry in columns)
         greatest, band = max(entry["greatest"] for entry in columns), np.abs(columns[0]["bands"]).max()
         lines.append(f"{name:26}{columns[0]['correlation']:12.5f}{scores}{greatest:10.2f}{band:7.2f}"
-                     f"{figures['halves']['greatest']:8.2f}{figures['halves']['rms']:6.2f}{figures.get('by_index', np.nan):10.4f}")
+                     f"{figures['halves']['greatest']:8.2f}{figures['halves']['rms']:6.2f}"
+                     f"{figures.get('by_index', np.nan):10.4f}")
     for name, rows in result["products"].items():
-        lines.append(f"product, seeds {name:9}{'share':>10}{'expected':>10}{'power':>8}{'score':>8}{'of shuffled':>13}{'alone':>8}")
+        lines.append(f"product, seeds {name:9}{'share':>10}{'expected':>10}{'power':>8}{'score':>8}{'of shuffled':>13}"
+                     f"{'alone':>8}")
         lines += ["< {level:<22g}{share:10.5f}{expected:10.5f}{power:8.3f}{power_score:8.2f}{of_shuffled:13.3f}"
                   "{alone_of_shuffled:8.3f}".format(**row) for row in rows]
     return lines
@@ -150,12 +165,14 @@ def plot(path, results):
     centres = (BANDS[:-1] + BANDS[1:]) / 2
     for axis, (lattice, result) in zip(axes[0], results.items()):
         for name, figures in result["pairs"].items():
-            same = len(set(name.split(", "))) == 1
-            axis.plot(centres, figures["grey"]["bands"], color="C3" if same else "0.8", lw=1, zorder=2 + same)
+            if "," in name:
+                equal = name.startswith("equal")
+                axis.plot(centres, figures["grey"]["bands"], color="C3" if equal else "0.6", lw=1, zorder=3 - equal)
         axis.set(title=lattice, xlabel="cycles / mm")
         axis.grid(alpha=0.3)
     axes[0, 0].set(ylabel="cross spectrum,\nstandard deviations")
-    axes[0, 0].legend([plt.Line2D([], [], color="C3"), plt.Line2D([], [], color="0.8")], ["equal seeds", "different seeds"])
+    lines = [plt.Line2D([], [], color=colour) for colour in ("C3", "0.6")]
+    axes[0, 0].legend(lines, ["masks of one seed", "masks of the program"], fontsize=8)
     picture.savefig(path, dpi=90, bbox_inches="tight")
 
 
@@ -176,14 +193,9 @@ def main():
     arguments = parser.parse_args()
     results = {}
     with tempfile.TemporaryDirectory() as folder:
-        shapes = {seed: shape_tile(arguments.program, folder, seed) for seed in SHAPE_SEEDS}
+        shapes = {seed: shape_tile(arguments.program, folder, seed) for seed in SEEDS}
         for lattice in arguments.lattice or LATTICES:
-            pitch = LATTICES[lattice]
-            tiles = {seed: halftone_tile(arguments.program, folder, pitch, seed) for seed in HALFTONE_SEEDS}
-            results[lattice] = rounded({
-                "pairs": {f"{a}, {b}": compare(tiles[a], shapes[b], pitch) for a in tiles for b in shapes},
-                "controls": controls(tiles[1], pitch),
-                "products": {f"{a}, {b}": products(tiles[a], shapes[b], pitch) for a, b in ((1, 1), (2, 1))}})
+            results[lattice] = study(arguments.program, folder, LATTICES[lattice], shapes)
             print("\n".join(lines_of(lattice, results[lattice])), flush=True)
     if arguments.json:
         arguments.json.write_text(json.dumps(results) + "\n")

@@ -23,7 +23,7 @@ def make_tile(program, folder, size, seed, kernel, sigma, weight=2):
     """Returns the thresholds [x, y, z] of a new mask. sigma: voxels [3]. Raises SystemExit with the words of the program."""
     path = pathlib.Path(folder) / "tile.vdb"
     command = [str(program), "mask", "--size", ",".join(map(str, size)), "--seed", str(seed), "--kernel", kernel, "--sigma",
-               ",".join(f"{length:.6g}" for length in sigma), "--space-weight", f"{weight:g}", "-o", str(path), "--overwrite",
+               ",".join(repr(float(length)) for length in sigma), "--space-weight", f"{weight:g}", "-o", str(path), "--overwrite",
                "--quiet"]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
