@@ -53,6 +53,7 @@ void checkExrAttributes(Bytes bytes, bool has_parts) {
         throw DataError("is not a readable EXR: it is cut short");
       at += static_cast<std::size_t>(size);
     }
+    if (at >= bytes.size()) throw DataError("is not a readable EXR: it is cut short");
     ++at;
   }
 }

@@ -142,6 +142,17 @@ TEST(TextureExr, RefusesOtherChannelsAndDamage) {
               HasSubstr("texture 'a' is a deep EXR; save it flat"));
 }
 
+TEST(TextureExr, RefusesHeadersOfPartsWithoutAnEnd) {
+  // The flag of several parts, and a header that ends with the file.
+  for (const bool has_attribute : {false, true}) {
+    Bytes bytes{0x76, 0x2F, 0x31, 0x01, 2, 0x10, 0, 0};
+    if (has_attribute)
+      for (const std::uint8_t byte : {'a', '\0', 'b', '\0', '\1', '\0', '\0', '\0', 'x'})
+        bytes.push_back(byte);
+    EXPECT_EQ(test::textureRefusal(bytes), "texture 'a' is not a readable EXR: it is cut short");
+  }
+}
+
 TEST(TextureExr, RefusesWhatAHeaderOnlyClaims) {
   Bytes bytes = exrOf({"Y"}, true, {}, 16, 16);
   const std::string text = test::textOf(bytes);
