@@ -255,21 +255,26 @@ def normal_of(text):
     return normal
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+def print_figures(name, description, figures_of, report_of):
+    """Runs a script on the stack and the facet of its command line.
+
+    figures_of  function from a Stack and a normal to figures for JSON; ValueError or OSError end the script with `name`
+    report_of   function from the figures to a text
+    """
+    parser = argparse.ArgumentParser(description=description.split("\n")[0])
     parser.add_argument("stack", metavar="STACK", help="folder with manifest.json")
     parser.add_argument("--normal", type=normal_of, default=[0, 0, 1], help="outward normal of the facet, X,Y,Z")
     parser.add_argument("--json", metavar="FILE", help="also writes the figures as JSON")
     arguments = parser.parse_args()
     try:
-        result = judge(read_stack(arguments.stack), arguments.normal)
+        figures = figures_of(read_stack(arguments.stack), arguments.normal)
     except (ValueError, OSError) as problem:
-        raise SystemExit(f"judge: {problem}")
-    print(report(result))
+        raise SystemExit(f"{name}: {problem}")
+    print(report_of(figures))
     if arguments.json:
         with open(arguments.json, "w") as file:
-            json.dump(result, file, indent=1)
+            json.dump(figures, file, indent=1)
 
 
 if __name__ == "__main__":
-    main()
+    print_figures("judge", __doc__, judge, report)

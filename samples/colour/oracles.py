@@ -20,15 +20,12 @@ Error diffusion of several materials: a voxel takes the material whose coverage 
 every material is passed on. Weights of neighbours that are not printed are shared by the others.
 """
 
-import argparse
 import dataclasses
 import itertools
-import json
 
 import numpy as np
 import optics
-from judge import LENGTHS_MM, facet_of, judge, normal_of, random_choice
-from printed_stack import read_stack
+from judge import LENGTHS_MM, facet_of, judge, print_figures, random_choice
 
 FLOYD_STEINBERG = {(1, 0, 0): 7 / 16, (-1, 1, 0): 3 / 16, (0, 1, 0): 5 / 16, (1, 1, 0): 1 / 16}
 SERIAL = {**{offset: weight / 2 for offset, weight in FLOYD_STEINBERG.items()}, (0, 0, 1): 1 / 4, (1, 0, 1): 1 / 16,
@@ -149,21 +146,5 @@ def report(results):
     return "\n".join(lines)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("stack", metavar="STACK", help="folder with manifest.json")
-    parser.add_argument("--normal", type=normal_of, default=[0, 0, 1], help="outward normal of the facet, X,Y,Z")
-    parser.add_argument("--json", metavar="FILE", help="also writes the figures as JSON")
-    arguments = parser.parse_args()
-    try:
-        results = compared(read_stack(arguments.stack), arguments.normal)
-    except (ValueError, OSError) as problem:
-        raise SystemExit(f"oracles: {problem}")
-    print(report(results))
-    if arguments.json:
-        with open(arguments.json, "w") as file:
-            json.dump(results, file, indent=1)
-
-
 if __name__ == "__main__":
-    main()
+    print_figures("oracles", __doc__, compared, report)

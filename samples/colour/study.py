@@ -81,12 +81,12 @@ class Program:
     def __init__(self, path, folder, steps):
         self.path, self.folder, self.steps = str(pathlib.Path(path).resolve()), pathlib.Path(folder), steps
 
-    def stack(self, printer, normal, size_mm, centre_mm, rgb, steps=None, refine=()):
+    def stack(self, printer, normal, size_mm, centre_mm, rgb, steps=None):
         """Returns the Stack of a plate. Raises SystemExit with the words of the program if it fails."""
         write_plate(self.folder / "plate.obj", normal, size_mm, centre_mm, rgb)
         out = self.folder / "out"
         shutil.rmtree(out, ignore_errors=True)
-        command = [self.path, "mesh2sdf", "plate.obj", "--printer", printer, "--colour", *refine, "!",
+        command = [self.path, "mesh2sdf", "plate.obj", "--printer", printer, "--colour", "!",
                    *(steps or self.steps).split(), "!", "slice-export", "out", "--quiet"]
         done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
         if done.returncode:
@@ -202,7 +202,7 @@ def lines_of_accuracy(cases):
     return lines
 
 
-DITHERS = {"dither": ("dither", ()), "no dither": ("dither --mask none", ()), "interlaced": ("interlace", ())}
+DITHERS = {"dither": "dither", "no dither": "dither --mask none", "interlaced": "interlace"}
 
 
 def study_dither(program, printer, normals, recipes):
@@ -211,8 +211,8 @@ def study_dither(program, printer, normals, recipes):
     for number, normal in enumerate(normals):
         for name in recipes:
             rgb = optics.linear(np.array(COLOURCHECKER[name]) / 255)
-            for title, (step, refine) in DITHERS.items():
-                stack = program.stack(printer, normal, PLATE_MM, place_of(number), rgb, f"{step} ! {rest}", refine)
+            for title, step in DITHERS.items():
+                stack = program.stack(printer, normal, PLATE_MM, place_of(number), rgb, f"{step} ! {rest}")
                 result = judge(stack, normal, grain=False)
                 result["de"] = float(differences(rgb, np.array(result["predicted"]["linear_rgb"])))
                 cases.append({"dither": title, "normal": list(normal), "recipe": name, **result})
