@@ -12,6 +12,7 @@
 #include "io/profile/material_table.h"
 #include "io/vdb/mask_cache.h"
 #include "ops/kernels/colour/coverage_reader.h"
+#include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/mask/mask_tile.h"
 #include "ops/kernels/mask/threshold_mask.h"
 #include "ops/kernels/printing/depth_bands.h"
@@ -84,10 +85,7 @@ class HalftoneFilter : public Filter {
     halftone_.emplace(order, mask(in.lattice.pitch_mm));
 
     Schema out = in;
-    const auto material = Int32Grid::create(0);
-    material->setName(material_grid);
-    material->setTransform(solid->transform().copy());
-    out.grids[material_grid] = material;
+    out.grids[material_grid] = makeMaterialGrid(solid->transform());
     out.metadata[materials_key] = toJson(MaterialTable(set_.inks));
     return out;
   }
@@ -112,9 +110,7 @@ class HalftoneFilter : public Filter {
 
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto solid = findGrid<BoolGrid>(in.grids, solid_grid);
-    const auto material = Int32Grid::create(0);
-    material->setName(material_grid);
-    material->setTransform(solid->transform().copy());
+    const Int32Grid::Ptr material = makeMaterialGrid(solid->transform());
     if (columns_.empty()) {
       const auto colour = findGrid<Vec3SGrid>(in.grids, colour_grid);
       const auto opacity = has_opacity_ ? findGrid<FloatGrid>(in.grids, opacity_grid) : nullptr;
@@ -149,18 +145,10 @@ class HalftoneFilter : public Filter {
   void planCoat() {
     coat_band_.clear();
     if (coat_.empty()) return;
-    const std::size_t colon = coat_.find(':');
-    if (colon == std::string::npos)
-      throw UsageError("--coat: '" + coat_ +
-                       "' must be a thickness and a material, as in 0.1mm:clear");
-    double depth_mm = 0;
-    try {
-      depth_mm = parseLengthMm(coat_.substr(0, colon), Range::above(0, 10));
-    } catch (const UsageError& error) {
-      throw UsageError(std::string("--coat: ") + error.what());
-    }
-    const std::size_t material = indexOf("--coat", coat_.substr(colon + 1));
-    coat_band_.push_back({depth_mm, static_cast<std::int32_t>(material) + 1});
+    constexpr double thickest_mm = 10;
+    const MaterialLayer coat = parseMaterialLayer("--coat", coat_, thickest_mm, "0.1mm:clear");
+    const std::size_t material = indexOf("--coat", coat.material);
+    coat_band_.push_back({coat.thickness_mm, static_cast<std::int32_t>(material) + 1});
   }
 
   /// Replaces the voxels of `material` that have a value in `coat`. All of these lie in leaves of
@@ -201,14 +189,12 @@ class HalftoneFilter : public Filter {
     for (const Column& column : columns_) findGrid<FloatGrid>(in.grids, column.grid);
     has_opacity_ = columns_.empty() && in.grids.contains(opacity_grid);
     if (has_opacity_) findGrid<FloatGrid>(in.grids, opacity_grid);
-    if (columns_.empty()) {
-      if (!in.grids.contains(colour_grid))
-        throw DataError(
-            "no colours: there must be the grid 'Cd' (mesh2sdf --colour makes it), grids named "
-            "coverage_ and a material, or those that --coverages names");
-      findGrid<Vec3SGrid>(in.grids, colour_grid);
-      return;
-    }
+    if (!columns_.empty()) return;
+    if (!in.grids.contains(colour_grid))
+      throw DataError(
+          "no colours: there must be the grid 'Cd' (mesh2sdf --colour makes it), grids named "
+          "coverage_ and a material, or those that --coverages names");
+    findGrid<Vec3SGrid>(in.grids, colour_grid);
   }
 
   /// The inks that coverages were made for, if the metadata hold all of them.

@@ -8,6 +8,7 @@
 #include "io/profile/ink_set.h"
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
+#include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/split_tiles.h"
 #include "ops/kernels/printing/depth_bands.h"
 #include "vdbdither/engine/operator.h"
@@ -46,6 +47,7 @@ class MaterialAssign : public Filter {
 
   Schema plan(const Schema& in) override {
     lattice_ = in.lattice;
+    colours_.reset();
     const auto solid = findGrid<BoolGrid>(in.grids, solid_grid);
     if (shell_.empty() != core_.empty())
       throw UsageError("--shell and --core go together; give both");
@@ -53,7 +55,7 @@ class MaterialAssign : public Filter {
       throw UsageError("--material, --parts and --shell exclude each other; give one");
     }
     if (material_.empty() && parts_.empty() && shell_.empty() && in.grids.contains(colour_grid) &&
-        printerMixesColours(in)) {
+        canMixColours(printerProfileOf(in).materials)) {
       colours_ = halftone();
       return colours_->plan(in);
     }
@@ -61,10 +63,7 @@ class MaterialAssign : public Filter {
     planTable(in);
 
     Schema out = in;
-    auto material = Int32Grid::create(0);
-    material->setName(material_grid);
-    material->setTransform(solid->transform().copy());
-    out.grids[material_grid] = material;
+    out.grids[material_grid] = makeMaterialGrid(solid->transform());
     out.metadata[materials_key] = toJson(table_);
     return out;
   }
@@ -95,8 +94,8 @@ class MaterialAssign : public Filter {
       material = valueByDepth(*solid, lattice_.pitch_mm, lattice_.box, in.core, in.valid, bands_,
                               static_cast<std::int32_t>(table_.size()));
     } else {
-      material = Int32Grid::create(valueWhereActive(solid->tree(), 1));
-      material->setTransform(solid->transform().copy());
+      material = makeMaterialGrid(solid->transform());
+      material->setTree(valueWhereActive(solid->tree(), 1));
       if (!parts_.empty())
         takeParts(material->tree(), findGrid<Int32Grid>(in.grids, part_grid)->tree());
     }
@@ -105,12 +104,6 @@ class MaterialAssign : public Filter {
   }
 
  private:
-  static bool printerMixesColours(const Schema& in) {
-    const auto printer = in.metadata.find(printer_key);
-    return printer != in.metadata.end() &&
-           canMixColours(printerProfileFromJson(printer->second).materials);
-  }
-
   /// The operator that chooses materials for colours, with the defaults of its options.
   [[nodiscard]] std::unique_ptr<Filter> halftone() const {
     std::unique_ptr<Operator> made = findOperator("halftone").make();
@@ -119,10 +112,7 @@ class MaterialAssign : public Filter {
   }
 
   void planTable(const Schema& in) {
-    std::vector<Material> known;
-    if (const auto printer = in.metadata.find(printer_key); printer != in.metadata.end()) {
-      known = printerProfileFromJson(printer->second).materials;
-    }
+    const std::vector<Material> known = printerProfileOf(in).materials;
     table_.clear();
     bands_.clear();
     if (!parts_.empty()) {
@@ -130,28 +120,17 @@ class MaterialAssign : public Filter {
     } else if (!shell_.empty()) {
       double depth_mm = 0;
       for (const std::string& layer : materialEntries(shell_)) {
-        const std::size_t colon = layer.find(':');
-        if (colon == std::string::npos) {
-          throw UsageError("--shell: '" + layer +
-                           "' must be a thickness and a material, as in 0.5mm:white");
-        }
-        const double thickness_mm = thicknessMm(layer, colon);
+        constexpr double thickest_mm = 1000;
+        const auto [thickness_mm, name] =
+            parseMaterialLayer("--shell", layer, thickest_mm, "0.5mm:white");
         depth_mm += thickness_mm;
-        add("--shell", layer.substr(colon + 1), known);
+        add("--shell", name, known);
         bands_.push_back({depth_mm, static_cast<std::int32_t>(table_.size())});
       }
       add("--core", core_, known);
     } else {
       if (material_.empty()) material_ = known.empty() ? "white" : known.front().name;
       add("--material", material_, known);
-    }
-  }
-
-  static double thicknessMm(const std::string& layer, std::size_t colon) {
-    try {
-      return parseLengthMm(layer.substr(0, colon), Range::above(0, 1000));
-    } catch (const UsageError& error) {
-      throw UsageError(std::string("--shell: ") + error.what());
     }
   }
 

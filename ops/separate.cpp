@@ -36,10 +36,8 @@ class Separate : public Filter {
       return std::string_view(entry.first).starts_with(coverage_prefix);
     });
     for (std::size_t ink = 0; ink < set_.inks.size(); ++ink) {
-      const auto grid = FloatGrid::create(0.0F);
+      const auto grid = makeCoverageGrid(colour->transform());
       grid->setName(coverageGridOf(set_.inks[ink]));
-      grid->setTransform(colour->transform().copy());
-      grid->setGridClass(openvdb::GRID_FOG_VOLUME);
       out.grids[grid->getName()] = grid;
     }
     out.metadata[materials_key] = toJson(MaterialTable(set_.inks));

@@ -92,9 +92,7 @@ class Simulate : public Filter {
 
   static Vec3d usualSpreadMm(const Schema& in) {
     constexpr double usual_mm = 0.05;
-    const auto profile = in.metadata.find(printer_key);
-    if (profile == in.metadata.end()) return Vec3d(usual_mm);
-    const Vec3d stated = printerProfileFromJson(profile->second).point_spread_mm;
+    const Vec3d stated = printerProfileOf(in).point_spread_mm;
     return stated.isZero() ? Vec3d(usual_mm) : stated;
   }
 
@@ -111,8 +109,9 @@ class Simulate : public Filter {
     const MaterialTable materials = materialTableFromJson(table->second);
     std::vector<bool> is_seen;
     for (const Material& material : materials) is_seen.push_back(!isClear(material));
+    const PrinterProfile printer = printerProfileOf(in);
     seen_.emplace(std::array{light_->weights(0), light_->weights(1), light_->weights(2)},
-                  linearColoursOf(materials, in), is_seen, yuleNielsenOf(in));
+                  linearColoursOf(materials, printer), is_seen, printer.yule_nielsen);
   }
 
   std::optional<Vec3d> spread_mm_;

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cctype>
 #include <map>
 #include <memory>
 #include <optional>
@@ -23,6 +22,7 @@
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -183,10 +183,7 @@ class SliceExport : public Sink {
     std::set<std::string> folders{manifest_name, preview_name};
     for (const Material& material : stack_.materials) {
       std::optional<std::string> problem = fileNameProblem(material.name);
-      std::string folder = material.name;
-      std::transform(folder.begin(), folder.end(), folder.begin(),
-                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-      if (!problem && !folders.insert(folder).second)
+      if (!problem && !folders.insert(lowerCase(material.name)).second)
         problem = "is that of another one, or of a file of the stack";
       if (!problem) continue;
       throw DataError(

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <lcms2.h>
+
+#include "io/image/colour_management.h"
 
 namespace vdbdither {
 
@@ -13,64 +14,11 @@ namespace {
 /// Profiles of presses have up to some MB.
 constexpr std::size_t most_profile_bytes = std::size_t{1} << 24;
 
-class Profile {
- public:
-  explicit Profile(cmsHPROFILE handle) : handle_(handle) {}
-  Profile(const Profile&) = delete;
-  Profile& operator=(const Profile&) = delete;
-  ~Profile() {
-    if (handle_ != nullptr) cmsCloseProfile(handle_);
-  }
-  [[nodiscard]] cmsHPROFILE get() const { return handle_; }
-
- private:
-  cmsHPROFILE handle_;
-};
-
-class Curve {
- public:
-  /// A power, or the encoding of sRGB.
-  Curve(cmsContext context, std::optional<double> exponent) {
-    constexpr int power_with_line = 4;
-    constexpr std::array<double, 5> srgb{2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045};
-    curve_ = exponent ? cmsBuildGamma(context, *exponent)
-                      : cmsBuildParametricToneCurve(context, power_with_line, srgb.data());
-  }
-  Curve(const Curve&) = delete;
-  Curve& operator=(const Curve&) = delete;
-  ~Curve() {
-    if (curve_ != nullptr) cmsFreeToneCurve(curve_);
-  }
-  [[nodiscard]] cmsToneCurve* get() const { return curve_; }
-
- private:
-  cmsToneCurve* curve_ = nullptr;
-};
-
-constexpr ColourSpace::Chromaticities rec709{
-    {{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}, {0.3127, 0.3290}}};
-
-cmsHPROFILE rgbProfile(cmsContext context, const ColourSpace::Chromaticities& chromaticities,
-                       std::optional<double> exponent) {
-  for (const auto& [x, y] : chromaticities) {
-    if (!(std::abs(x) <= 2 && y > 1e-4 && y <= 2)) return nullptr;
-  }
-  const auto position = [&](std::size_t i) {
-    return cmsCIExyY{chromaticities[i][0], chromaticities[i][1], 1};
-  };
-  const cmsCIExyY white = position(3);
-  const cmsCIExyYTRIPLE primaries{position(0), position(1), position(2)};
-  const Curve curve(context, exponent);
-  if (curve.get() == nullptr) return nullptr;
-  const std::array<cmsToneCurve*, 3> curves{curve.get(), curve.get(), curve.get()};
-  return cmsCreateRGBProfileTHR(context, &white, &primaries, curves.data());
-}
-
-cmsHPROFILE profileOf(cmsContext context, const ColourSpace& space) {
+CmsProfile profileOf(cmsContext context, const ColourSpace& space) {
   if (!space.icc_profile.empty()) {
     if (space.icc_profile.size() > most_profile_bytes) return nullptr;
-    return cmsOpenProfileFromMemTHR(context, space.icc_profile.data(),
-                                    static_cast<cmsUInt32Number>(space.icc_profile.size()));
+    return CmsProfile(cmsOpenProfileFromMemTHR(
+        context, space.icc_profile.data(), static_cast<cmsUInt32Number>(space.icc_profile.size())));
   }
   if (!space.chromaticities) return nullptr;
   return rgbProfile(context, *space.chromaticities, space.exponent);
@@ -82,13 +30,11 @@ cmsHPROFILE profileOf(cmsContext context, const ColourSpace& space) {
 class ColourTransform::Engine {
  public:
   /// A broken profile leaves no transform.
-  Engine(const ColourSpace& space, std::size_t channels)
-      : context_(cmsCreateContext(nullptr, nullptr)) {
-    if (context_ == nullptr) return;
-    cmsSetLogErrorHandlerTHR(context_, [](cmsContext, cmsUInt32Number, const char*) {});
-    const Profile from(profileOf(context_, space));
-    const Profile to(rgbProfile(context_, rec709, 1));
-    if (from.get() == nullptr || to.get() == nullptr) return;
+  Engine(const ColourSpace& space, std::size_t channels) : context_(quietContext()) {
+    if (!context_) return;
+    const CmsProfile from = profileOf(context_.get(), space);
+    const CmsProfile to = rgbProfile(context_.get(), rec709, 1);
+    if (!from || !to) return;
     // A number, since a profile may hold one that is none of the enumeration's.
     const auto kind = static_cast<cmsUInt32Number>(cmsGetColorSpace(from.get()));
     cmsUInt32Number format = 0;
@@ -104,15 +50,9 @@ class ColourTransform::Engine {
     } else {
       return;
     }
-    transform_ =
-        cmsCreateTransformTHR(context_, from.get(), format, to.get(), TYPE_RGB_FLT,
-                              INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOCACHE | cmsFLAGS_NOOPTIMIZE);
-  }
-  Engine(const Engine&) = delete;
-  Engine& operator=(const Engine&) = delete;
-  ~Engine() {
-    if (transform_ != nullptr) cmsDeleteTransform(transform_);
-    if (context_ != nullptr) cmsDeleteContext(context_);
+    transform_.reset(cmsCreateTransformTHR(context_.get(), from.get(), format, to.get(),
+                                           TYPE_RGB_FLT, INTENT_RELATIVE_COLORIMETRIC,
+                                           cmsFLAGS_NOCACHE | cmsFLAGS_NOOPTIMIZE));
   }
 
   [[nodiscard]] bool isReady() const { return transform_ != nullptr; }
@@ -123,7 +63,7 @@ class ColourTransform::Engine {
     constexpr float ink_unit = 100;
     for (std::size_t i = 0; channels_ == 4 && i < 4; ++i) samples[i] *= ink_unit;
     Linear linear{};
-    cmsDoTransform(transform_, samples.data(), linear.data(), 1);
+    cmsDoTransform(transform_.get(), samples.data(), linear.data(), 1);
     for (float& value : linear) {
       if (!std::isfinite(value)) value = 0;
     }
@@ -131,8 +71,8 @@ class ColourTransform::Engine {
   }
 
  private:
-  cmsContext context_;
-  cmsHTRANSFORM transform_ = nullptr;
+  CmsContext context_;
+  CmsTransform transform_;
   std::size_t channels_ = 0;
 };
 

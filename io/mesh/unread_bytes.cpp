@@ -3,32 +3,26 @@
 #include <bit>
 #include <cstdint>
 
+#include "vdbdither/model/split_mix.h"
+
 namespace vdbdither {
 
 using openvdb::Vec3d;
 
 namespace {
 
-std::uint64_t mixed(std::uint64_t bits) {
-  // The finalizer of SplitMix64: G. Steele, D. Lea, C. Flood, "Fast Splittable Pseudorandom Number
-  // Generators", 2014.
-  bits = (bits ^ bits >> 30) * 0xBF58476D1CE4E5B9;
-  bits = (bits ^ bits >> 27) * 0x94D049BB133111EB;
-  return bits ^ bits >> 31;
-}
-
 std::uint64_t hashOf(const Vec3d& position) {
   std::uint64_t hash = 0;
   for (int axis = 0; axis < 3; ++axis) {
     const double coordinate = position[axis] + 0.0;  // −0 becomes +0
-    hash = mixed(hash + 0x9E3779B97F4A7C15 + std::bit_cast<std::uint64_t>(coordinate));
+    hash = splitMix(hash + std::bit_cast<std::uint64_t>(coordinate));
   }
   return hash;
 }
 
 /// The hash of a side, which that of the opposite side does not determine.
 std::uint64_t hashOfSide(std::uint64_t from, std::uint64_t to) {
-  return mixed(from + std::rotl(to, 23));
+  return scattered(from + std::rotl(to, 23));
 }
 
 }  // namespace

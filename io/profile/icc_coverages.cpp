@@ -2,19 +2,18 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstdint>
 #include <filesystem>
-#include <lcms2.h>
-#include <memory>
 #include <string>
 #include <string_view>
 
 #include "io/file/whole_file.h"
+#include "io/image/colour_management.h"
 #include "io/profile/material_table.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/printable.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -22,34 +21,7 @@ namespace {
 
 constexpr int table_edge = 33;
 
-template <auto destroy>
-struct Destroy {
-  template <typename T>
-  void operator()(T* handle) const {
-    destroy(handle);
-  }
-};
-using Context = std::unique_ptr<_cmsContext_struct, Destroy<cmsDeleteContext>>;
-using Profile = std::unique_ptr<void, Destroy<cmsCloseProfile>>;
-using Transform = std::unique_ptr<void, Destroy<cmsDeleteTransform>>;
-using Curve = std::unique_ptr<cmsToneCurve, Destroy<cmsFreeToneCurve>>;
-
-Context quietContext() {
-  Context context(cmsCreateContext(nullptr, nullptr));
-  cmsSetLogErrorHandlerTHR(context.get(), [](cmsContext, cmsUInt32Number, const char*) {});
-  return context;
-}
-
-/// Linear light with the primaries of Rec. 709 and D65.
-Profile linearRgb(cmsContext context) {
-  const cmsCIExyY white{0.3127, 0.3290, 1};
-  const cmsCIExyYTRIPLE primaries{{0.64, 0.33, 1}, {0.30, 0.60, 1}, {0.15, 0.06, 1}};
-  const Curve line(cmsBuildGamma(context, 1));
-  const std::array<cmsToneCurve*, 3> curves{line.get(), line.get(), line.get()};
-  return Profile(cmsCreateRGBProfileTHR(context, &white, &primaries, curves.data()));
-}
-
-Profile outputProfile(const std::string& path, cmsContext context) {
+CmsProfile outputProfile(const std::string& path, cmsContext context) {
   const std::string shown = "'" + printable(path) + "'";
   std::error_code none;
   if (!std::filesystem::exists(path, none)) throw UsageError("--icc: no such file " + shown);
@@ -57,20 +29,13 @@ Profile outputProfile(const std::string& path, cmsContext context) {
     throw UsageError("--icc: " + shown + " is not a regular file");
   constexpr std::uint64_t most_bytes = std::uint64_t{1} << 26;
   const std::vector<std::uint8_t> bytes = readWholeFile(path, shown, most_bytes);
-  Profile profile(
+  CmsProfile profile(
       cmsOpenProfileFromMemTHR(context, bytes.data(), static_cast<cmsUInt32Number>(bytes.size())));
   if (!profile) throw DataError("--icc: " + shown + " is not an ICC profile, or it is damaged");
   if (cmsGetDeviceClass(profile.get()) != cmsSigOutputClass)
     throw DataError("--icc: " + shown +
                     " is not a profile of a printer (class 'prtr'); give an output profile");
   return profile;
-}
-
-std::string lowerCase(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return lower;
 }
 
 /// The names of the channels: those of the profile, or those of CMYK.
@@ -175,13 +140,13 @@ cmsUInt32Number intentOf(Intent intent) {
   return INTENT_PERCEPTUAL;
 }
 
-Transform transformTo(cmsContext context, cmsHPROFILE profile, const InkOptions& options) {
-  const Profile from = linearRgb(context);
+CmsTransform transformTo(cmsContext context, cmsHPROFILE profile, const InkOptions& options) {
+  const CmsProfile from = rgbProfile(context, rec709, 1);
   cmsUInt32Number flags = cmsFLAGS_NOCACHE | cmsFLAGS_NOOPTIMIZE;
   if (options.black_point == BlackPoint::compensated) flags |= cmsFLAGS_BLACKPOINTCOMPENSATION;
   const cmsUInt32Number sixteen_bits = cmsFormatterForColorspaceOfProfile(profile, 2, FALSE);
-  Transform transform(cmsCreateTransformTHR(context, from.get(), TYPE_RGB_FLT, profile,
-                                            sixteen_bits, intentOf(options.intent), flags));
+  CmsTransform transform(cmsCreateTransformTHR(context, from.get(), TYPE_RGB_FLT, profile,
+                                               sixteen_bits, intentOf(options.intent), flags));
   if (!transform)
     throw DataError("--icc: the profile '" + printable(options.icc) +
                     "' has no table for --intent " + std::string(nameOf(intents, options.intent)) +
@@ -192,15 +157,15 @@ Transform transformTo(cmsContext context, cmsHPROFILE profile, const InkOptions&
 }  // namespace
 
 CoverageTable readIccCoverages(const InkOptions& options, const InkSet& set) {
-  const Context context = quietContext();
-  const Profile profile = outputProfile(options.icc, context.get());
+  const CmsContext context = quietContext();
+  const CmsProfile profile = outputProfile(options.icc, context.get());
   const auto count = static_cast<std::size_t>(cmsChannelsOf(cmsGetColorSpace(profile.get())));
   if (cmsGetColorSpace(profile.get()) == cmsSigRgbData || count == 1)
     throw DataError("--icc: the channels of '" + printable(options.icc) +
                     "' are not inks; give a profile of CMYK or of named inks");
   const std::vector<std::size_t> channels = inksOfChannels(options, set, profile.get(), count);
   const std::size_t rest = restOf(set, channels);
-  const Transform transform = transformTo(context.get(), profile.get(), options);
+  const CmsTransform transform = transformTo(context.get(), profile.get(), options);
 
   CoverageTable table;
   table.edge = table_edge;

@@ -1,7 +1,6 @@
 #include "io/profile/ink_set.h"
 
 #include <algorithm>
-#include <cctype>
 #include <string>
 
 #include "io/image/srgb.h"
@@ -9,15 +8,12 @@
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
 #include "vdbdither/model/errors.h"
-#include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
 bool isClear(const Material& material) {
-  std::string name = material.name;
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return name.find("clear") != std::string::npos;
+  return lowerCase(material.name).find("clear") != std::string::npos;
 }
 
 namespace {
@@ -40,20 +36,20 @@ std::vector<Material> namedInks(const std::string& text, const std::vector<Mater
   return inks;
 }
 
-/// The profile in the metadata, or one that says nothing.
-PrinterProfile printerOf(const Schema& in) {
-  const auto printer = in.metadata.find(printer_key);
-  return printer == in.metadata.end() ? PrinterProfile() : printerProfileFromJson(printer->second);
+/// Returns the material of the same name and display colour, or null.
+const Material* sameAs(const Material& material, const std::vector<Material>& known) {
+  const auto same = std::find_if(known.begin(), known.end(), [&](const Material& other) {
+    return other.name == material.name && other.rgba == material.rgba;
+  });
+  return same == known.end() ? nullptr : &*same;
 }
 
 /// Gives inks the absorption and scattering of the profile. Without those of an ink that colours,
 /// they all mix by their colours.
 void takeCoefficients(const std::vector<Material>& known, InkSet& set) {
   for (std::size_t ink = 0; ink < set.inks.size(); ++ink) {
-    const auto same = std::find_if(known.begin(), known.end(), [&](const Material& other) {
-      return other.name == set.inks[ink].name && other.rgba == set.inks[ink].rgba;
-    });
-    if (same != known.end() && same->absorption && same->scattering) {
+    const Material* same = sameAs(set.inks[ink], known);
+    if (same != nullptr && same->absorption && same->scattering) {
       set.inks[ink].absorption = same->absorption;
       set.inks[ink].scattering = same->scattering;
     } else if (ink != set.clear) {
@@ -73,8 +69,9 @@ bool canMixColours(const std::vector<Material>& materials) {
 
 InkSet inkSetOf(const InkOptions& options, const Schema& in, const std::vector<Material>& usual) {
   InkSet set;
-  const std::vector<Material> known = printerOf(in).materials;
-  set.yule_nielsen = yuleNielsenOf(in);
+  const PrinterProfile printer = printerProfileOf(in);
+  const std::vector<Material>& known = printer.materials;
+  set.yule_nielsen = printer.yule_nielsen;
   set.inks = !options.inks.empty() ? namedInks(options.inks, known) : usual.empty() ? known : usual;
   if (set.inks.empty())
     throw UsageError(
@@ -86,7 +83,7 @@ InkSet inkSetOf(const InkOptions& options, const Schema& in, const std::vector<M
   if (!known.empty() && set.inks.size() > known.size())
     throw UsageError("--inks: there are " + std::to_string(set.inks.size()) +
                      " materials, and the printer takes " + std::to_string(known.size()));
-  set.linear_rgb = linearColoursOf(set.inks, in);
+  set.linear_rgb = linearColoursOf(set.inks, printer);
   for (std::size_t ink = 0; ink < set.inks.size(); ++ink) {
     if (!isClear(set.inks[ink])) continue;
     if (set.clear)
@@ -98,7 +95,7 @@ InkSet inkSetOf(const InkOptions& options, const Schema& in, const std::vector<M
     throw UsageError("--inks: there must be an ink besides the clear one");
   set.black = options.black;
   set.media_relative = options.white == White::media;
-  set.kubelka_munk = printerOf(in).kubelka_munk;
+  set.kubelka_munk = printer.kubelka_munk;
   if (set.kubelka_munk) takeCoefficients(known, set);
   if (!options.icc.empty()) {
     set.table = readIccCoverages(options, set);
@@ -109,14 +106,11 @@ InkSet inkSetOf(const InkOptions& options, const Schema& in, const std::vector<M
 }
 
 std::vector<openvdb::Vec3d> linearColoursOf(const std::vector<Material>& materials,
-                                            const Schema& in) {
-  const std::vector<Material> known = printerOf(in).materials;
+                                            const PrinterProfile& printer) {
   std::vector<openvdb::Vec3d> colours;
   for (const Material& material : materials) {
-    const auto same = std::find_if(known.begin(), known.end(), [&](const Material& other) {
-      return other.name == material.name && other.rgba == material.rgba;
-    });
-    if (same != known.end() && same->linear_rgb) {
+    const Material* same = sameAs(material, printer.materials);
+    if (same != nullptr && same->linear_rgb) {
       colours.push_back(*same->linear_rgb);
       continue;
     }
@@ -127,7 +121,5 @@ std::vector<openvdb::Vec3d> linearColoursOf(const std::vector<Material>& materia
   }
   return colours;
 }
-
-openvdb::Vec3d yuleNielsenOf(const Schema& in) { return printerOf(in).yule_nielsen; }
 
 }  // namespace vdbdither

@@ -23,13 +23,9 @@ bool canMixColours(const std::vector<Material>& materials);
 InkSet inkSetOf(const InkOptions& options, const Schema& in,
                 const std::vector<Material>& usual = {});
 
-/// Returns the colours of materials: those that the printer's profile in the metadata of `in` has
-/// measured under the same names, or else their display colours.
+/// Returns the colours of materials: those that the profile has measured under the same names and
+/// display colours, or else their display colours.
 std::vector<openvdb::Vec3d> linearColoursOf(const std::vector<Material>& materials,
-                                            const Schema& in);
-
-/// Returns the factors n of Yule and Nielsen of the printer's profile in the metadata of `in`; 2
-/// where there is none.
-openvdb::Vec3d yuleNielsenOf(const Schema& in);
+                                            const PrinterProfile& printer);
 
 }  // namespace vdbdither

@@ -11,8 +11,10 @@
 
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/json_text.h"
+#include "vdbdither/engine/option_values.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/printable.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -46,9 +48,7 @@ std::optional<std::array<std::uint8_t, 4>> rgbaOf(const ordered_json& json) {
 }  // namespace
 
 bool sameName(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
-    return std::tolower(x) == std::tolower(y);
-  });
+  return equalsIgnoringCase(a, lowerCase(b));
 }
 
 std::array<std::uint8_t, 4> parseColour(std::string_view text) {
@@ -114,6 +114,20 @@ std::vector<std::string> materialEntries(const std::string& text) {
     }
   }
   return entries;
+}
+
+MaterialLayer parseMaterialLayer(const std::string& option, const std::string& text,
+                                 double thickest_mm, const std::string& example) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos)
+    throw UsageError(option + ": '" + text + "' must be a thickness and a material, as in " +
+                     example);
+  try {
+    return {parseLengthMm(text.substr(0, colon), Range::above(0, thickest_mm)),
+            text.substr(colon + 1)};
+  } catch (const UsageError& error) {
+    throw UsageError(option + ": " + error.what());
+  }
 }
 
 Material parseMaterial(std::string_view text, const std::vector<Material>& known) {

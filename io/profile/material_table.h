@@ -30,6 +30,17 @@ bool sameName(std::string_view a, std::string_view b);
 /// not.
 std::vector<std::string> materialEntries(const std::string& text);
 
+/// A layer of a material, as `0.5mm:white` writes it.
+struct MaterialLayer {
+  double thickness_mm = 0;
+  std::string material;
+};
+
+/// Reads a layer of more than 0 and up to `thickest_mm`. Throws UsageError that begins with the
+/// name of the option and shows `example`.
+MaterialLayer parseMaterialLayer(const std::string& option, const std::string& text,
+                                 double thickest_mm, const std::string& example);
+
 /// Reads `name`, `name=#rrggbb`, `name=#rrggbbaa`, `name=r,g,b` or `name=r,g,b,a`; names may serve
 /// as file names. A bare name is looked up in `known`, then among the usual inks (white, black,
 /// clear, cyan, magenta, yellow and their Vero names), case aside. Throws UsageError with what

@@ -13,6 +13,7 @@
 #include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/options.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/printable.h"
 
 namespace vdbdither {
@@ -243,15 +244,12 @@ std::string toJson(const PrinterProfile& profile) {
   json["name"] = profile.name;
   json["title"] = profile.title;
   json["source"] = profile.source;
-  json["pitch_mm"] = {profile.pitch_mm[0], profile.pitch_mm[1], profile.pitch_mm[2]};
-  json["build_mm"] = {profile.build_mm[0], profile.build_mm[1], profile.build_mm[2]};
-  if (!profile.point_spread_mm.isZero()) {
-    json["point_spread_mm"] = {profile.point_spread_mm[0], profile.point_spread_mm[1],
-                               profile.point_spread_mm[2]};
-  }
-  if (profile.yule_nielsen != PrinterProfile().yule_nielsen) {
+  json["pitch_mm"] = tripleOf(profile.pitch_mm);
+  json["build_mm"] = tripleOf(profile.build_mm);
+  if (!profile.point_spread_mm.isZero())
+    json["point_spread_mm"] = tripleOf(profile.point_spread_mm);
+  if (profile.yule_nielsen != PrinterProfile().yule_nielsen)
     json["yule_nielsen"] = tripleOf(profile.yule_nielsen);
-  }
   if (const auto& mirror = profile.kubelka_munk)
     json["kubelka_munk"] = {{"outer", mirror->outer}, {"inner", tripleOf(mirror->inner)}};
   json["materials"] = ordered_json::array();
@@ -272,6 +270,12 @@ PrinterProfile printerProfileFromJson(const std::string& text) {
     throw DataError(std::string("the metadata vdbdither:printer is not a printer profile: ") +
                     error.what());
   }
+}
+
+PrinterProfile printerProfileOf(const Schema& schema) {
+  const auto printer = schema.metadata.find(printer_key);
+  return printer == schema.metadata.end() ? PrinterProfile()
+                                          : printerProfileFromJson(printer->second);
 }
 
 std::vector<std::string> installedPrinters() {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "vdbdither/model/printer.h"
+#include "vdbdither/model/schema.h"
 
 namespace vdbdither {
 
@@ -19,6 +20,9 @@ std::vector<std::string> printerProfileProblems(const std::string& name_or_path)
 /// The profile in one line of JSON, as grids carry it under `vdbdither:printer`; and back.
 std::string toJson(const PrinterProfile& profile);
 PrinterProfile printerProfileFromJson(const std::string& text);
+
+/// The profile in the metadata of `schema`, or one that says nothing. Throws DataError.
+PrinterProfile printerProfileOf(const Schema& schema);
 
 /// The names of the profiles in the data folder, sorted.
 std::vector<std::string> installedPrinters();

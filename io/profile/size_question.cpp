@@ -50,10 +50,7 @@ std::optional<std::string> sizeQuestion(const Vec3d& size_mm, const PlacementOpt
   // 3 m and 0.1 mm, as far as floats of a file tell.
   constexpr double largest_mm = 3000 * (1 - 1e-6);
   constexpr double minimum_mm = 0.1 * (1 + 1e-6);
-  const auto profile = schema.metadata.find(printer_key);
-  const Vec3d build_mm = profile == schema.metadata.end()
-                             ? Vec3d(0.0)
-                             : printerProfileFromJson(profile->second).build_mm;
+  const Vec3d build_mm = printerProfileOf(schema).build_mm;
   const double longest_mm = longestOf(size_mm);
   if (longest_mm >= largest_mm || (longest_mm > 0 && longest_mm <= minimum_mm))
     return partIs(size_mm) + "; " + likelierUnit(longest_mm, placement, is_fitted);

@@ -1,10 +1,14 @@
 #include "tests/support/contract.h"
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <sstream>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "io/mesh/mesh_writer.h"
 #include "io/vdb/vdb.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/png_reader.h"
@@ -41,21 +45,15 @@ std::string runChain(std::vector<Step> steps, const std::vector<std::string>& mo
   return listener.printed;
 }
 
-/// The mesh as a text PLY with a colour at every vertex.
-std::string colouredPly(const Mesh& mesh) {
-  std::ostringstream text;
-  text << "ply\nformat ascii 1.0\nelement vertex " << mesh.vertices.size()
-       << "\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty "
-          "uchar green\nproperty uchar blue\nelement face "
-       << mesh.triangles.size() << "\nproperty list uchar int vertex_indices\nend_header\n";
-  for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
-    const auto& vertex = mesh.vertices[n];
-    text << vertex[0] << ' ' << vertex[1] << ' ' << vertex[2] << ' ' << n % 256 << ' '
-         << n * 3 % 256 << ' ' << n * 5 % 256 << '\n';
-  }
-  for (const Mesh::Triangle& triangle : mesh.triangles)
-    text << "3 " << triangle[0] << ' ' << triangle[1] << ' ' << triangle[2] << '\n';
-  return text.str();
+/// Writes the mesh as a PLY with a colour at every vertex.
+void writeColouredPly(const Mesh& mesh, const fs::path& path) {
+  std::vector<std::array<std::uint8_t, 3>> colours;
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
+    colours.push_back({static_cast<std::uint8_t>(n), static_cast<std::uint8_t>(3 * n),
+                       static_cast<std::uint8_t>(5 * n)});
+  MeshWriter writer(path, {true, false, ""});
+  writer.add(mesh.vertices, mesh.triangles, 0, colours);
+  writer.commit();
 }
 
 /// Every registered operator by its example, in a folder with a part.
@@ -76,7 +74,7 @@ class Contract : public testing::TestWithParam<const OperatorInfo*> {
     const Mesh part =
         test::transformed(test::torusMesh({0, 0, 0}, 0.7, 0.3, 40), {20, 35, 0}, {0.11, 0.2, 0.3});
     scratch_.write(name + "/part.stl", test::binaryStl(part));
-    scratch_.write(name + "/part.ply", colouredPly(part));
+    writeColouredPly(part, folder / "part.ply");
     return folder;
   }
 

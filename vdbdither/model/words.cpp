@@ -5,6 +5,12 @@
 
 namespace vdbdither {
 
+namespace {
+
+char lowerCaseOf(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+}  // namespace
+
 std::string alternatives(std::span<const std::string> words) {
   std::string text;
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -14,10 +20,15 @@ std::string alternatives(std::span<const std::string> words) {
   return text;
 }
 
+std::string lowerCase(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(), lowerCaseOf);
+  return lower;
+}
+
 bool equalsIgnoringCase(std::string_view word, std::string_view lower) {
-  return std::equal(word.begin(), word.end(), lower.begin(), lower.end(), [](char c, char wanted) {
-    return (c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c) == wanted;
-  });
+  return std::equal(word.begin(), word.end(), lower.begin(), lower.end(),
+                    [](char c, char wanted) { return lowerCaseOf(c) == wanted; });
 }
 
 }  // namespace vdbdither

@@ -9,6 +9,9 @@ namespace vdbdither {
 /// Returns `a`, `a or b`, `a, b or c`: what a refusal lists.
 std::string alternatives(std::span<const std::string> words);
 
+/// Returns `text` with its ASCII letters in lower case.
+std::string lowerCase(std::string_view text);
+
 /// Whether two ASCII words are equal but for upper and lower case; `lower` is lower case.
 bool equalsIgnoringCase(std::string_view word, std::string_view lower);
 

@@ -20,23 +20,6 @@ using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using openvdb::Int32Tree;
 
-namespace {
-
-/// Appends the origins of the leaves that active tiles stand for, in the layers `core`.
-void appendTileOrigins(const openvdb::Vec3STree& tree, ZRange core, std::vector<Coord>& origins) {
-  auto tile = tree.cbeginValueOn();
-  tile.setMaxDepth(openvdb::Vec3STree::ValueOnCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    const openvdb::CoordBBox box = tile.getBoundingBox();
-    for (int x = box.min().x(); x <= box.max().x(); x += leaf_layers)
-      for (int y = box.min().y(); y <= box.max().y(); y += leaf_layers)
-        for (int z = box.min().z(); z <= box.max().z(); z += leaf_layers)
-          if (rowWithin(z, core) != 0) origins.emplace_back(x, y, z);
-  }
-}
-
-}  // namespace
-
 Int32Tree::Ptr Halftone::run(const openvdb::BoolTree& solid, const CoverageSource& source,
                              std::int32_t bare, ZRange core) const {
   Int32Tree::Ptr material = valueWhereActive(solid, bare);
@@ -86,6 +69,13 @@ std::vector<std::size_t> darkestFirst(const InkSet& set) {
   return order;
 }
 
+FloatGrid::Ptr makeCoverageGrid(const openvdb::math::Transform& transform) {
+  auto grid = FloatGrid::create(0.0F);
+  grid->setTransform(transform.copy());
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  return grid;
+}
+
 std::vector<FloatGrid::Ptr> coverageGrids(const openvdb::Vec3SGrid& colour,
                                           const CoverageSource& source, std::size_t inks,
                                           ZRange core) {
@@ -115,9 +105,7 @@ std::vector<FloatGrid::Ptr> coverageGrids(const openvdb::Vec3SGrid& colour,
   });
   std::vector<FloatGrid::Ptr> grids;
   for (auto& leaves : made) {
-    grids.push_back(FloatGrid::create(0.0F));
-    grids.back()->setTransform(colour.transform().copy());
-    grids.back()->setGridClass(openvdb::GRID_FOG_VOLUME);
+    grids.push_back(makeCoverageGrid(colour.transform()));
     for (auto& leaf : leaves)
       if (leaf && !leaf->isEmpty()) grids.back()->tree().addLeaf(leaf.release());
   }

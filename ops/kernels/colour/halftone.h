@@ -42,6 +42,9 @@ class Halftone {
 /// Returns an order of the inks for Halftone: by rising luminance, the clear one before the last.
 std::vector<std::size_t> darkestFirst(const InkSet& set);
 
+/// Returns an empty grid of coverages without a name.
+openvdb::FloatGrid::Ptr makeCoverageGrid(const openvdb::math::Transform& transform);
+
 /// Returns a grid for each ink of the set: its coverage at the active voxels of `colour` in the
 /// layers `core`.
 std::vector<openvdb::FloatGrid::Ptr> coverageGrids(const openvdb::Vec3SGrid& colour,

@@ -12,6 +12,7 @@
 #include "ops/kernels/colour/small_matrix.h"
 #include "ops/kernels/colour/table_separation.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/split_mix.h"
 
 namespace vdbdither {
 
@@ -20,14 +21,9 @@ using openvdb::Vec3s;
 
 namespace {
 
-/// Returns a number of 0 … 1 that has no relation to those of other indices (Steele, Lea, Flood:
-/// Fast splittable pseudorandom number generators, 2014).
+/// Returns a number of 0 … 1 that has no relation to those of other indices.
 double randomShare(std::uint64_t index) {
-  std::uint64_t bits = (index + 1) * 0x9E3779B97F4A7C15U;
-  bits = (bits ^ (bits >> 30)) * 0xBF58476D1CE4E5B9U;
-  bits = (bits ^ (bits >> 27)) * 0x94D049BB133111EBU;
-  bits ^= bits >> 31;
-  return std::ldexp(static_cast<double>(bits >> 11), -53);
+  return std::ldexp(static_cast<double>(splitMix(index * split_mix_step) >> 11), -53);
 }
 
 std::vector<std::size_t> inksThatColour(const InkSet& set) {

@@ -31,22 +31,27 @@ class Inverse {
  public:
   explicit Inverse(const InkSet& set)
       : law_(set), black_(set.black), media_relative_(set.media_relative), inks_(law_.inks()) {
+    std::vector<Vec3d> colours;
     std::vector<double> luminance;
-    for (std::size_t ink = 0; ink < inks_; ++ink)
-      luminance.push_back(luminanceOf(law_.colourOf(alone(ink))));
+    for (std::size_t ink = 0; ink < inks_; ++ink) {
+      std::vector<double> alone(inks_);
+      alone[ink] = 1;
+      colours.push_back(law_.colourOf(alone));
+      luminance.push_back(luminanceOf(colours.back()));
+    }
     const auto [dark, light] = std::minmax_element(luminance.begin(), luminance.end());
     dark_ = static_cast<std::size_t>(dark - luminance.begin());
     light_ = static_cast<std::size_t>(light - luminance.begin());
+    dark_colour_ = colours[dark_];
+    light_colour_ = colours[light_];
     forEachChoice(inks_, 4,
                   [&](const std::vector<std::size_t>& choice) { choices_.push_back(choice); });
   }
 
   /// Returns the coverages for linear light.
   [[nodiscard]] std::vector<double> coveragesOf(const Vec3d& linear_rgb) const {
-    const Vec3d roots =
-        rootsOf(media_relative_ ? betweenInks(linear_rgb, law_.colourOf(alone(dark_)),
-                                              law_.colourOf(alone(light_)))
-                                : linear_rgb);
+    const Vec3d roots = rootsOf(
+        media_relative_ ? betweenInks(linear_rgb, dark_colour_, light_colour_) : linear_rgb);
     if (const auto exact = mixtureOf(roots)) return *exact;
     const std::vector<double> aim = aimOf(roots);
     const Vec3d from = rootsOf(law_.colourOf(aim));
@@ -69,12 +74,6 @@ class Inverse {
   [[nodiscard]] const KubelkaMunk& law() const { return law_; }
 
  private:
-  [[nodiscard]] std::vector<double> alone(std::size_t ink) const {
-    std::vector<double> coverages(inks_);
-    coverages[ink] = 1;
-    return coverages;
-  }
-
   /// Returns coverages whose mixture has this colour, if there are any. All of them are means of
   /// those with four inks.
   [[nodiscard]] std::optional<std::vector<double>> mixtureOf(const Vec3d& roots) const {
@@ -157,6 +156,8 @@ class Inverse {
   std::size_t inks_;
   std::size_t dark_ = 0;
   std::size_t light_ = 0;
+  Vec3d dark_colour_{0.0};
+  Vec3d light_colour_{1.0};
   std::vector<std::vector<std::size_t>> choices_;
 };
 

@@ -68,6 +68,13 @@ openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform) 
   return grid;
 }
 
+openvdb::Int32Grid::Ptr makeMaterialGrid(const openvdb::math::Transform& transform) {
+  auto grid = openvdb::Int32Grid::create(0);
+  grid->setName(material_grid);
+  grid->setTransform(transform.copy());
+  return grid;
+}
+
 openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform,
                                      std::span<const SolidLeaf> leaves,
                                      std::span<const CoordBBox> boxes) {

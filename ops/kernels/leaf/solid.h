@@ -23,6 +23,9 @@ std::vector<openvdb::CoordBBox> insideTiles(const openvdb::FloatTree& surface, Z
 /// Returns an empty grid `solid`, in which voxels inside the part are active and true.
 openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform);
 
+/// Returns an empty grid `material`, in which 0 is empty.
+openvdb::Int32Grid::Ptr makeMaterialGrid(const openvdb::math::Transform& transform);
+
 /// Returns the grid `solid` of boxes, which are filled whole, and of leaves, which replace what the
 /// boxes filled. The tree is canonical: its topology depends on the voxels alone.
 openvdb::BoolGrid::Ptr makeSolidGrid(const openvdb::math::Transform& transform,

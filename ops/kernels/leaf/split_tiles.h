@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "ops/kernels/leaf/leaf_origins.h"
 #include "vdbdither/model/lattice.h"
 #include "vdbdither/model/openvdb.h"
 
@@ -26,18 +27,14 @@ void splitTiles(openvdb::Int32Tree& tree, const IsSplit& is_split) {
   found.setMaxDepth(openvdb::Int32Tree::ValueOnCIter::LEAF_DEPTH - 1);
   for (; found; ++found) tiles.push_back({found.getBoundingBox(), found.getValue()});
   for (const auto& [box, value] : tiles) {
-    for (int x = box.min().x(); x <= box.max().x(); x += leaf_layers) {
-      for (int y = box.min().y(); y <= box.max().y(); y += leaf_layers) {
-        for (int z = box.min().z(); z <= box.max().z(); z += leaf_layers) {
-          const openvdb::Coord at(x, y, z);
-          if (is_split(at)) {
-            tree.touchLeaf(at);
-          } else if (box.dim().x() > leaf_layers) {
-            tree.addTile(1, at, value, true);
-          }
-        }
+    forEachLeafOrigin(box, [&tree, &is_split, is_large = box.dim().x() > leaf_layers,
+                            on = value](const openvdb::Coord& at) {
+      if (is_split(at)) {
+        tree.touchLeaf(at);
+      } else if (is_large) {
+        tree.addTile(1, at, on, true);
       }
-    }
+    });
   }
 }
 

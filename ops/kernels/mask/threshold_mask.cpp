@@ -8,21 +8,13 @@
 #include <openvdb/tools/Dense.h>
 
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/split_mix.h"
 
 namespace vdbdither {
 
 using openvdb::Coord;
 
 namespace {
-
-/// The finalizer of SplitMix64 (Steele, Lea, Flood: Fast Splittable Pseudorandom Number Generators,
-/// 2014).
-std::uint64_t mixed(std::uint64_t bits) {
-  bits += 0x9e3779b97f4a7c15U;
-  bits = (bits ^ (bits >> 30U)) * 0xbf58476d1ce4e5b9U;
-  bits = (bits ^ (bits >> 27U)) * 0x94d049bb133111ebU;
-  return bits ^ (bits >> 31U);
-}
 
 std::string text(const Coord& ijk) {
   return std::to_string(ijk.x()) + "," + std::to_string(ijk.y()) + "," + std::to_string(ijk.z());
@@ -85,8 +77,9 @@ Coord ThresholdMask::size() const {
 
 float ThresholdMask::operator()(const Coord& ijk) const {
   if (values_.empty()) {
-    std::uint64_t hash = mixed(seed_);
-    for (int axis = 0; axis < 3; ++axis) hash = mixed(hash ^ static_cast<std::uint32_t>(ijk[axis]));
+    std::uint64_t hash = splitMix(seed_);
+    for (int axis = 0; axis < 3; ++axis)
+      hash = splitMix(hash ^ static_cast<std::uint32_t>(ijk[axis]));
     // Odd multiples of 2⁻²⁴: each is exact as a float, and none is 0 or 1.
     return static_cast<float>(2 * (hash >> 41U) + 1) * 0x1p-24F;
   }

@@ -15,6 +15,8 @@
 #include <limits>
 #include <numeric>
 
+#include "vdbdither/model/split_mix.h"
+
 namespace vdbdither {
 
 namespace {
@@ -473,12 +475,7 @@ std::vector<std::uint32_t> ranksOf(const VoidAndCluster& settings,
 
 bool isSmall(const Coord& size) { return Bricks(size).voxels() <= 32768; }
 
-std::uint64_t nextRandom(std::uint64_t& state) {  // SplitMix64
-  std::uint64_t z = (state += 0x9e3779b97f4a7c15u);
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
-}
+std::uint64_t nextRandom(std::uint64_t& state) { return scattered(state += split_mix_step); }
 
 }  // namespace
 

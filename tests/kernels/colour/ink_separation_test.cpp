@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "ops/kernels/colour/table_separation.h"
+#include "tests/support/coverages.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -16,6 +17,7 @@ namespace {
 
 using openvdb::Vec3d;
 using openvdb::Vec3s;
+using test::expectCoverages;
 
 const Vec3d white{0.87, 0.87, 0.87};
 const Vec3d black{0.0103, 0.0103, 0.0123};
@@ -77,15 +79,6 @@ class RandomMixtures {
  private:
   std::mt19937 random_;
 };
-
-void expectCoverages(const std::vector<float>& coverages) {
-  double sum = 0;
-  for (const float coverage : coverages) {
-    EXPECT_GE(coverage, 0);
-    sum += double{coverage};
-  }
-  EXPECT_NEAR(sum, 1, 1e-6);
-}
 
 TEST(InkSeparation, IsExactForEveryColourThatTheInksMix) {
   const std::vector<std::vector<Vec3d>> sets = {

@@ -8,6 +8,7 @@
 
 #include "ops/kernels/colour/ink_mixture.h"
 #include "ops/kernels/colour/separation.h"
+#include "tests/support/coverages.h"
 
 namespace vdbdither {
 namespace {
@@ -96,12 +97,7 @@ TEST(KubelkaMunk, InksMayAbsorbNearlyEverything) {
   std::vector<float> coverages(6);
   for (const float light : {0.0F, 0.01F, 0.2F, 0.9F}) {
     separation->run(openvdb::Vec3s(light), coverages);
-    double sum = 0;
-    for (const float coverage : coverages) {
-      EXPECT_GE(coverage, 0);
-      sum += double{coverage};
-    }
-    EXPECT_NEAR(sum, 1, 1e-6);
+    test::expectCoverages(coverages);
   }
 }
 
@@ -116,12 +112,7 @@ TEST(KubelkaMunk, TheTableMixesTheColoursThatTheInksCanMix) {
       const Vec3d wanted = mixed(set, randomMixture(random));
       separation->run(openvdb::Vec3s(wanted), coverages);
       EXPECT_EQ(coverages[2], 0);
-      double sum = 0;
-      for (const float coverage : coverages) {
-        EXPECT_GE(coverage, 0);
-        sum += double{coverage};
-      }
-      EXPECT_NEAR(sum, 1, 1e-6);
+      test::expectCoverages(coverages);
       differences.push_back(difference(mixed(set, coverages), wanted));
     }
     std::sort(differences.begin(), differences.end());
