@@ -41,7 +41,7 @@ class Simulate : public Filter {
   Schema plan(const Schema& in) override {
     const auto solid = findGrid<openvdb::BoolGrid>(in.grids, solid_grid);
     box_ = in.lattice.box;
-    if (!spread_mm_) spread_mm_ = usualSpreadMm(in);
+    if (!spread_mm_) spread_mm_ = pointSpreadMmOf(in);
     spread_.emplace(in.lattice.pitch_mm, *spread_mm_);
     checkReach(*spread_, 500, "--spread: the droplets would reach", "spread");
     Schema out = in;
@@ -88,12 +88,6 @@ class Simulate : public Filter {
     if (std::max({reach.x(), reach.y(), reach.z()}) > furthest)
       throw UsageError(what + " over more than " + std::to_string(furthest) +
                        " voxels; give a smaller " + remedy);
-  }
-
-  static Vec3d usualSpreadMm(const Schema& in) {
-    constexpr double usual_mm = 0.05;
-    const Vec3d stated = printerProfileOf(in).point_spread_mm;
-    return stated.isZero() ? Vec3d(usual_mm) : stated;
   }
 
   /// Prepares the colours of the table of materials; measured ones come from the profile.

@@ -278,6 +278,12 @@ PrinterProfile printerProfileOf(const Schema& schema) {
                                           : printerProfileFromJson(printer->second);
 }
 
+openvdb::Vec3d pointSpreadMmOf(const Schema& schema) {
+  constexpr double usual_mm = 0.05;
+  const openvdb::Vec3d stated = printerProfileOf(schema).point_spread_mm;
+  return stated.isZero() ? openvdb::Vec3d(usual_mm) : stated;
+}
+
 std::vector<std::string> installedPrinters() {
   std::vector<std::string> names;
   for (const std::filesystem::path& folder : dataFolders()) {

@@ -24,6 +24,10 @@ PrinterProfile printerProfileFromJson(const std::string& text);
 /// The profile in the metadata of `schema`, or one that says nothing. Throws DataError.
 PrinterProfile printerProfileOf(const Schema& schema);
 
+/// How far a droplet of the printer spreads: the standard deviation of a Gaussian along each axis,
+/// as the profile in the metadata of `schema` states it, or 50 µm by convention. Throws DataError.
+openvdb::Vec3d pointSpreadMmOf(const Schema& schema);
+
 /// The names of the profiles in the data folder, sorted.
 std::vector<std::string> installedPrinters();
 

@@ -123,7 +123,7 @@ print()
 
 constants = ["control", "0.5 voxel", "1 voxel", "1.5 voxel", "2 voxel", "2.5 foot", "3 foot", "4 foot", "5 foot", "6 foot",
              "triangular 2", "coverage", "4 closest", "4 voxel", "2 closest", "2 voxel, paper's mask", "paper",
-             "best, paper's mask", "best 25", "best", "best 100"]
+             "best 25", "best", "best 100"]
 if every:
     shown = sorted({key[2] for key in every})
     for spread in (50, 100):

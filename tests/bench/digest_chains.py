@@ -135,7 +135,7 @@ def voxels():
     dithers = ["", "--preset paper --size 24", "--mask none", "--mask white", "--mask white --seed 7", "--mask tile.vdb",
                "--mask tile.vdb --preset paper", "--mask paper --size 16", "--size 16", "--size 16 --sigma 1.3 --seed 5",
                "--preset paper --mask white", "--preset paper --mask blue", "--preset paper --mask none",
-               "--amplitude 1", "--amplitude 2 --mask white", "--amplitude 0", "--amplitude adapted --preset paper --mask white",
+               "--amplitude 1", "--amplitude 2 --mask white", "--amplitude 0", "--method mask",
                "--spread 20um", "--spread 0.1mm", "--displaced", "--displaced --preset paper --mask white", "--guard none",
                "--guard walls --preset paper --mask white", "--slab 8 --threads 1", "--slab all --threads 2", "--layers 20:40"]
     dithers += [f"--at {at} --mask {mask} {more}".strip() for at in ("closest", "foot", "voxel")

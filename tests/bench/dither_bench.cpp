@@ -8,6 +8,7 @@
 
 #include "ops/kernels/distance/closest_surface_voxel.h"
 #include "ops/kernels/distance/gradient.h"
+#include "ops/kernels/dither/error_diffusion.h"
 #include "ops/kernels/dither/interlace.h"
 #include "ops/kernels/dither/shape_dither.h"
 
@@ -112,35 +113,12 @@ void dither(benchmark::State& state, DitherAt at, bool given_normals, bool with_
 /// The default.
 void best(benchmark::State& state, bool given_normals, bool guarded) {
   const SphereSlab& slab = sphereSlab(static_cast<int>(state.range(0)));
-  const ShapeDither dither{pitch_mm,
-                           2,
-                           DitherAt::voxel,
-                           randomMask(),
-                           std::make_shared<AdaptedAmplitude>(pitch_mm, 0.05),
-                           guarded};
+  const ErrorDiffusion dither(pitch_mm, Vec3d(0.05), guarded);
   for (auto _ : state) {
     benchmark::DoNotOptimize(dither.run(*slab.surface, given_normals ? slab.normals.get() : nullptr,
-                                        slab.core, slab.valid, false));
+                                        slab.core, slab.valid));
   }
   reportPerVoxel(state, slab, pitch_mm.length());
-}
-
-/// The amplitudes of all normals that there are, on the lattice whose pitch is `state.range(0)`
-/// times this one.
-void adaptedAmplitude(benchmark::State& state) {
-  constexpr int per_side = 300;
-  for (auto _ : state) {
-    const AdaptedAmplitude adapted(pitch_mm * static_cast<double>(state.range(0)), 0.05);
-    for (int axis = 0; axis < 3; ++axis) {
-      for (int n = 0; n < per_side * per_side; ++n) {
-        openvdb::Vec3s normal;
-        normal[axis] = 1;
-        normal[(axis + 1) % 3] = std::pow(static_cast<float>(n / per_side) / per_side, 2.0F);
-        normal[(axis + 2) % 3] = std::pow(static_cast<float>(n % per_side) / per_side, 2.0F);
-        benchmark::DoNotOptimize(adapted(normal));
-      }
-    }
-  }
 }
 
 void normals(benchmark::State& state) {
@@ -178,7 +156,6 @@ BENCHMARK_CAPTURE(dither, voxel, DitherAt::voxel, true, false) AT_HEIGHTS;
 BENCHMARK_CAPTURE(best, best, true, true) AT_HEIGHTS;
 BENCHMARK_CAPTURE(best, best_own_normals, false, true) AT_HEIGHTS;
 BENCHMARK_CAPTURE(best, best_unguarded, true, false) AT_HEIGHTS;
-BENCHMARK(adaptedAmplitude)->Arg(1)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
 BENCHMARK(normals) AT_HEIGHTS;
 BENCHMARK(surfaceVoxels) AT_HEIGHTS;
 BENCHMARK(interlaced) AT_HEIGHTS;

@@ -37,7 +37,7 @@ TEST(Dither, MakesTheSameOfSlabsOfAnyHeightWhateverLiesBeyondItsReach) {
   with_normals.grids.merge(test::runWhole(*test::filterCalled("normals"), plain));
   for (const Schema& schema : {plain, with_normals}) {
     for (const std::string at : {"closest", "foot", "voxel"}) {
-      for (const std::string amplitude : {"4", "8", "adapted"}) {
+      for (const std::string amplitude : {"2", "4", "8"}) {
         const auto dither =
             test::filterCalled("dither", {"--mask", "white", "--at", at, "--amplitude", amplitude});
         const auto solid =
@@ -218,7 +218,7 @@ TEST(Dither, RefusesASurfaceThatDoesNotReachFarEnough) {
       [&] {
         test::filterCalled("dither", {"--mask", "white"})->plan(thin);
       },
-      ThrowsMessage<DataError>(HasSubstr("--amplitude adapted on this lattice needs 0.0965 mm")));
+      ThrowsMessage<DataError>(HasSubstr("--amplitude 2 on this lattice needs 0.0965 mm")));
   EXPECT_NO_THROW(test::filterCalled("dither", {"--mask", "none"})->plan(thin));
 }
 
@@ -247,17 +247,70 @@ TEST(Dither, RefusesAmplitudesBeyondEightAndPlacesItDoesNotKnow) {
     EXPECT_THAT(planning("--amplitude", bad),
                 ThrowsMessage<UsageError>("--amplitude: '" + bad +
                                           "' is not accepted; the value must be a number from 0 "
-                                          "to 8, or adapted"));
+                                          "to 8"));
   }
   EXPECT_THROW(planning("--at", "surface")(), UsageError);
   EXPECT_THROW(planning("--guard", "all")(), UsageError);
-  for (const std::string bad : {"2mm", "9um", "1e9mm"}) {
-    EXPECT_THAT(planning("--spread", bad),
-                ThrowsMessage<UsageError>("--spread: '" + bad +
-                                          "' is not accepted; the length must be from 0.01 mm to "
-                                          "1 mm"));
-  }
   EXPECT_THROW(test::filterCalled("dither", {"--preset", "worst"}), UsageError);
+}
+
+TEST(Dither, DiffusionRefusesABlurThatNoPrinterHas) {
+  for (const std::string bad : {"2mm", "0.5um", "1e9mm"}) {
+    EXPECT_THROW(test::filterCalled("dither", {"--spread", bad}), UsageError) << bad;
+  }
+}
+
+TEST(Dither, RefusesOptionsOfTheOtherMethod) {
+  const auto planning = [](const std::vector<std::string>& words) {
+    return [words] { test::filterCalled("dither", words)->plan(ballOn(mimaki)); };
+  };
+  EXPECT_THAT(planning({"--method", "diffusion", "--at", "foot"}),
+              ThrowsMessage<UsageError>("--at: only --method mask has it; leave it out"));
+  EXPECT_THAT(planning({"--mask", "white", "--spread", "50um"}),
+              ThrowsMessage<UsageError>("--spread: only --method diffusion has it; leave it out"));
+  EXPECT_THAT(planning({"--method", "diffusion", "--displaced"}),
+              ThrowsMessage<UsageError>("--displaced: only --method mask has it; leave it out"));
+  EXPECT_NO_THROW(planning({"--method", "diffusion", "--spread", "25um,30um,40um"})());
+}
+
+test::Voxels solidBy(const std::vector<std::string>& options, const Schema& schema) {
+  return test::dense(
+      *openvdb::gridConstPtrCast<BoolGrid>(
+          test::runWhole(*test::filterCalled("dither", options), schema).at("solid")),
+      mimaki.box);
+}
+
+TEST(Dither, DiffusesByDefaultForTheBlurOfThePrinter) {
+  Schema schema = ballOn(mimaki);
+  const test::Voxels usual = solidBy({}, schema);
+  EXPECT_EQ(usual, solidBy({"--method", "diffusion", "--spread", "50um"}, schema));
+  EXPECT_GT(test::differences(usual, solidBy({"--spread", "25um"}, schema)), 10);
+  schema.metadata[printer_key] =
+      R"({"name": "p", "pitch_mm": [0.042, 0.084, 0.022], "point_spread_mm": [0.03, 0.04, 0.05]})";
+  EXPECT_EQ(solidBy({}, schema), solidBy({"--spread", "0.03,0.04,0.05"}, schema));
+}
+
+TEST(Dither, DiffusionMakesTheSameOfSlabsOfAnyHeight) {
+  // On the second lattice blocks are two leaves high.
+  const Lattice fine = test::latticeAround({0.042, 0.084, 0.014}, {0.6, 0.6, 0.6}, 0.3);
+  for (const Lattice& lattice : {mimaki, fine}) {
+    Schema schema = test::schemaOf(
+        lattice,
+        {{"surface", test::sampled(test::sphere({0.01, 0.02, -0.1}, 0.55), lattice, 0.2)}});
+    for (const bool with_normals : {false, true}) {
+      if (with_normals)
+        schema.grids.merge(test::runWhole(*test::filterCalled("normals"), Schema(schema)));
+      const auto dither = test::filterCalled("dither");
+      const test::Voxels whole = test::dense(
+          *openvdb::gridConstPtrCast<BoolGrid>(test::runWhole(*dither, schema).at("solid")),
+          lattice.box);
+      for (const int height : {8, 16, 24, 64}) {
+        EXPECT_EQ(
+            test::differences(test::solidOfSlabs(*dither, schema, height, lattice.box), whole), 0)
+            << height;
+      }
+    }
+  }
 }
 
 test::Voxels solidBy(const std::vector<std::string>& options) {
@@ -271,12 +324,11 @@ test::Voxels solidBy(const std::vector<std::string>& options) {
 
 TEST(Dither, PresetsAreWhatTheirOptionsSay) {
   EXPECT_EQ(solidBy({}), solidBy({"--preset", "best"}));
-  EXPECT_EQ(solidBy({}), solidBy({"--preset", "paper", "--amplitude", "adapted", "--at", "voxel",
+  EXPECT_EQ(solidBy({}), solidBy({"--preset", "paper", "--amplitude", "2", "--at", "voxel",
                                   "--guard", "walls"}));
   EXPECT_EQ(solidBy({"--preset", "paper"}),
             solidBy({"--amplitude", "4", "--at", "closest", "--guard", "none"}));
   EXPECT_GT(test::differences(solidBy({}), solidBy({"--preset", "paper"})), 1000);
-  EXPECT_GT(test::differences(solidBy({}), solidBy({"--spread", "25um"})), 10);
 }
 
 }  // namespace

@@ -87,20 +87,35 @@ double bandFor(const ShapeDither& dither) {
   return dither.largestDisplacementMm() + dither.pitch_mm.length();
 }
 
-ShapeDither defaultDither(const Vec3d& pitch_mm, bool guarded) {
-  return {pitch_mm,
-          2,
-          DitherAt::voxel,
-          permutationMask(16),
-          std::make_shared<AdaptedAmplitude>(pitch_mm, 0.05),
-          guarded};
+ErrorDiffusion defaultDither(const Vec3d& pitch_mm, bool guarded) {
+  return {pitch_mm, Vec3d(0.05), guarded};
 }
 
+namespace {
+
+/// `print` makes the printed voxels of a surface on a lattice.
+template <typename Print>
+Printed printedOn(const Vec3d& pitch_mm, const TestShape& shape, double band_mm, Print print) {
+  const Lattice lattice = latticeAround(pitch_mm, shape.extent_mm, 0.3);
+  const auto surface = sampled(shape.distance, lattice, band_mm);
+  return {plainVoxels(dense(*surface, lattice.box)),
+          dense(*print(*surface, lattice.layers()), lattice.box)};
+}
+
+}  // namespace
+
 Printed printed(const ShapeDither& dither, const TestShape& shape) {
-  const Lattice lattice = latticeAround(dither.pitch_mm, shape.extent_mm, 0.3);
-  const auto surface = sampled(shape.distance, lattice, bandFor(dither));
-  const auto result = dither.run(*surface, nullptr, lattice.layers(), lattice.layers(), false);
-  return {plainVoxels(dense(*surface, lattice.box)), dense(*result.solid, lattice.box)};
+  return printedOn(dither.pitch_mm, shape, bandFor(dither),
+                   [&](const openvdb::FloatGrid& surface, ZRange layers) {
+                     return dither.run(surface, nullptr, layers, layers, false).solid;
+                   });
+}
+
+Printed printedByDefault(const Vec3d& pitch_mm, const TestShape& shape, bool guarded) {
+  return printedOn(pitch_mm, shape, 1.5 * pitch_mm.length(),
+                   [&](const openvdb::FloatGrid& surface, ZRange layers) {
+                     return defaultDither(pitch_mm, guarded).run(surface, nullptr, layers, layers);
+                   });
 }
 
 const TestShape& ballShape() {

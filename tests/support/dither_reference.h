@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 
+#include "ops/kernels/dither/error_diffusion.h"
 #include "ops/kernels/dither/shape_dither.h"
 #include "tests/support/volumes.h"
 
@@ -38,8 +39,8 @@ ThresholdMask permutationMask(int size);
 /// The band that a dither needs of `sampled`, mm.
 double bandFor(const ShapeDither& dither);
 
-/// The default dither: adapted to a spread of 0.05 mm and guarded.
-ShapeDither defaultDither(const openvdb::Vec3d& pitch_mm, bool guarded = true);
+/// The default dither: error diffusion for a spread of 0.05 mm, guarded.
+ErrorDiffusion defaultDither(const openvdb::Vec3d& pitch_mm, bool guarded = true);
 
 /// The voxels printed of a shape, without dithering and with it.
 struct Printed {
@@ -47,6 +48,8 @@ struct Printed {
   Voxels dithered;
 };
 Printed printed(const ShapeDither& dither, const TestShape& shape);
+Printed printedByDefault(const openvdb::Vec3d& pitch_mm, const TestShape& shape,
+                         bool guarded = true);
 
 /// Shapes that are thick everywhere.
 const TestShape& ballShape();

@@ -31,6 +31,7 @@ namespace cost {
 // Microseconds for each leaf.
 inline constexpr double compare_us_per_grid = 3;
 inline constexpr double csg_us = 14;
+inline constexpr double diffusion_us = 20;
 inline constexpr double dither_us = 6;
 inline constexpr double dither_own_normals_us = 3;
 inline constexpr double dither_plain_us = 2;  ///< without displacement
@@ -47,6 +48,8 @@ inline constexpr double mesh2sdf_normals_us = 8;
 inline constexpr double mesh2sdf_us_per_triangle = 1.2;  ///< of those near the leaf
 inline constexpr double normals_us = 4.7;
 inline constexpr double offset_us = 5.5;
+inline constexpr double refine_us = 20;
+inline constexpr double refine_us_per_sweep = 100;
 inline constexpr double resample_us = 400;
 inline constexpr double separate_us = 30;
 inline constexpr double simulate_colours_us = 150;

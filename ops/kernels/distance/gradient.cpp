@@ -1,5 +1,6 @@
 #include "ops/kernels/distance/gradient.h"
 
+#include "ops/kernels/leaf/floats.h"
 #include "vdbdither/model/known_grids.h"
 
 #ifdef __SSE2__
@@ -18,23 +19,14 @@ namespace {
 
 constexpr float no_sample = std::numeric_limits<float>::infinity();
 
-using Floats = float __attribute__((vector_size(16)));
-using Bits = std::int32_t __attribute__((vector_size(16)));
-
-inline Floats load(const float* from) {
-  Floats values;
-  std::memcpy(&values, from, sizeof values);
-  return values;
-}
-
-inline Bits isSample(Floats values) { return (values < no_sample) & (values > -no_sample); }
+inline FloatBits isSample(Floats values) { return (values < no_sample) & (values > -no_sample); }
 
 inline Floats slope(const float* at, int stride, float per_pitch) {
-  const Floats below = load(at - stride);
-  const Floats centre = load(at);
-  const Floats above = load(at + stride);
-  const Bits has_below = isSample(below);
-  const Bits has_above = isSample(above);
+  const Floats below = loadFloats(at - stride);
+  const Floats centre = loadFloats(at);
+  const Floats above = loadFloats(at + stride);
+  const FloatBits has_below = isSample(below);
+  const FloatBits has_above = isSample(above);
   const Floats rise = (has_above ? above : centre) - (has_below ? below : centre);
   const Floats whole = Floats{} + per_pitch;
   return rise * ((has_above & has_below) ? 0.5F * whole : whole);

@@ -13,6 +13,7 @@
 #include "ops/kernels/distance/closest_surface_voxel.h"
 #include "ops/kernels/distance/gradient.h"
 #include "ops/kernels/dither/voxel_diameter.h"
+#include "ops/kernels/dither/voxel_normals.h"
 #include "ops/kernels/dither/wall_guard.h"
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
@@ -28,103 +29,11 @@ using openvdb::Vec3STree;
 
 namespace {
 
-using NormalAccessor = openvdb::tree::ValueAccessor<const Vec3STree, false>;
-
-/// Returns f by eq. (5), or by the facet's own rule. Returns zero, without reading the mask, if no
-/// threshold can change a voxel at the distance `d_mm`.
-float displacement(const ShapeDither& dither, const Vec3s& normal, const Coord& ijk,
-                   float d_mm = 0) {
+/// Returns f by eq. (5).
+float displacement(const ShapeDither& dither, const Vec3s& normal, const Coord& ijk) {
   const double half_diameter = halfVoxelDiameter(normal, dither.pitch_mm);
-  if (!dither.adapted)
-    return static_cast<float>(dither.amplitude * half_diameter * (double{dither.mask(ijk)} - 0.5));
-  if (std::abs(d_mm) > half_diameter) return 0;
-  const FacetDither facet = (*dither.adapted)(normal);
-  const double half_step = ((ijk.x() ^ ijk.y() ^ ijk.z()) & 1) != 0 ? 0.5 : -0.5;
-  const double random =
-      facet.amplitude != 0 ? double{facet.amplitude} * (double{dither.mask(ijk)} - 0.5) : 0;
-  return static_cast<float>(half_diameter * (double{facet.checker} * half_step + random));
+  return static_cast<float>(dither.amplitude * half_diameter * (double{dither.mask(ijk)} - 0.5));
 }
-
-/// The normals of one leaf's voxels: those given, or those of the gradient, computed row by row on
-/// demand.
-class VoxelNormals {
- public:
-  VoxelNormals(const ShapeDither& dither, const FloatTree& surface, const Vec3STree* given,
-               ZRange valid)
-      : gradient_(surface, dither.pitch_mm, valid), per_pitch_(Vec3d(1.0) / dither.pitch_mm) {
-    if (given) given_.emplace(*given);
-  }
-
-  /// Prepares for the `wanted` voxels of `leaf`.
-  void visit(const FloatLeaf& leaf, const LeafBits& wanted) {
-    leaf_ = &leaf;
-    wanted_ = wanted;
-    visited_ = false;
-    rows_made_ = 0;
-  }
-
-  /// The distances in the leaf and around it.
-  const LeafSurroundings& around() {
-    if (!visited_) gradient_.visit(*leaf_, wanted_);
-    visited_ = true;
-    return gradient_.around();
-  }
-
-  /// Returns the normal of the active voxel at `offset`.
-  Vec3s operator()(unsigned offset) {
-    if (given_) return given_->getValue(leaf_->offsetToGlobalCoord(offset));
-    makeRow(offset / 8);
-    return {normals_[0][offset], normals_[1][offset], normals_[2][offset]};
-  }
-
-  /// Returns those of `undecided` that are within `reach`·k_D of the surface along their normal,
-  /// and perhaps others.
-  LeafBits within(const LeafBits& undecided, double reach) {
-    if (given_) return undecided;
-    LeafBits near = no_bits;
-    const auto limit = static_cast<float>(reach * (1 + 1e-5));
-    for (unsigned row = 0; row < 64; ++row) {
-      const auto bits = static_cast<std::uint8_t>(undecided[row / 8] >> (row % 8 * 8));
-      if (bits == 0) continue;
-      makeRow(row);
-      const float* d = leaf_->buffer().data() + std::size_t{8} * row;
-      std::array<float, 8> steepest{};  // 1 / (2·k_D)
-      for (unsigned axis = 0; axis < 3; ++axis) {
-        const float* normal = &normals_[axis][std::size_t{8} * row];
-        for (unsigned z = 0; z < 8; ++z) {
-          const float steep = std::abs(normal[z]) * per_pitch_[axis];
-          steepest[z] = steep > steepest[z] ? steep : steepest[z];
-        }
-      }
-      std::array<float, 8> diameters;  // |d| / k_D
-      for (unsigned z = 0; z < 8; ++z) diameters[z] = 2 * std::abs(d[z]) * steepest[z];
-      near[row / 8] |=
-          std::uint64_t{static_cast<std::uint8_t>(bits & rowBelow(diameters.data(), limit))}
-          << (row % 8 * 8);
-    }
-    return near;
-  }
-
- private:
-  void makeRow(unsigned row) {
-    const std::uint64_t bit = std::uint64_t{1} << row;
-    if ((rows_made_ & bit) != 0) return;
-    rows_made_ |= bit;
-    around();
-    const LeafNormals::Row made = gradient_.row(8 * row);
-    for (unsigned axis = 0; axis < 3; ++axis)
-      std::copy_n(made[axis].data(), 8, &normals_[axis][std::size_t{8} * row]);
-  }
-
-  LeafNormals gradient_;
-  std::optional<NormalAccessor> given_;
-  openvdb::Vec3f per_pitch_;
-  const FloatLeaf* leaf_ = nullptr;
-  LeafBits wanted_{};
-  bool visited_ = false;
-  std::uint64_t rows_made_ = 0;  ///< one bit per row along z, in the order of the leaf
-  std::array<std::array<float, 512>, 3> normals_{};
-};
 
 /// Returns f on ∂V, active at its voxels. A leaf's transient data holds the bits of its maximum
 /// |f|.
@@ -228,8 +137,8 @@ class AtVoxel {
     return normals_.within(undecided, dither_.amplitude / 2);
   }
 
-  float operator()(unsigned offset, float d) {
-    return displacement(dither_, normals_(offset), leaf_->offsetToGlobalCoord(offset), d);
+  float operator()(unsigned offset, float) {
+    return displacement(dither_, normals_(offset), leaf_->offsetToGlobalCoord(offset));
   }
 
  private:
@@ -278,7 +187,7 @@ ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
   const Vec3STree* given = normals ? &normals->tree() : nullptr;
   const auto decide = [&](const auto& make_reader) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size()), [&](const auto& range) {
-      VoxelNormals voxel_normals(*this, surface.tree(), given, valid);
+      VoxelNormals voxel_normals(surface.tree(), pitch_mm, given, valid);
       auto f = make_reader(voxel_normals);
       WallGuard guard(surface.tree(), pitch_mm, surface.background(), valid);
       for (std::size_t n = range.begin(); n != range.end(); ++n) {

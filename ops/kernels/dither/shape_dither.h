@@ -3,11 +3,8 @@
 // The dither family: kernels that turn distances and thresholds into printed voxels, by shape
 // dithering or by interlacing.
 
-#include <memory>
-
 #include <openvdb/openvdb.h>
 
-#include "ops/kernels/dither/adapted_amplitude.h"
 #include "ops/kernels/mask/threshold_mask.h"
 #include "vdbdither/model/lattice.h"
 
@@ -30,8 +27,6 @@ struct ShapeDither {
   double amplitude = 4;  ///< the constant of eq. (5)
   DitherAt at = DitherAt::closest;
   ThresholdMask mask = ThresholdMask::constant(0.5F);
-  /// The constant by facet, if not null. It never exceeds 2, which `amplitude` must then be.
-  std::shared_ptr<const AdaptedAmplitude> adapted = nullptr;
   bool guarded = false;  ///< keeps thin walls and gaps; see WallGuard
 
   /// F, the maximum |f|: half the amplitude times the largest k_D, which is half a voxel's

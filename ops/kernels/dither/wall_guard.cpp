@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <tuple>
+
+#include "ops/kernels/leaf/floats.h"
 
 namespace vdbdither {
 
@@ -14,6 +17,10 @@ namespace {
 /// A surface of a smaller radius does not count as a single sheet; its edges and wires do not
 /// change.
 constexpr double minimum_radius_mm = 0.3;
+
+inline Floats clamped(Floats values, Floats bound) {
+  return greaterOf(lesserOf(values, bound), -bound);
+}
 
 }  // namespace
 
@@ -65,18 +72,32 @@ bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsi
       beyond_mm < 2 * depth_mm + half_diameter_mm - (steps - 1) * rise_all_mm)
     return false;
 
+  // Three neighbours along z at a time; the fourth lane is idle.
+  const auto [pitch_x, pitch_y, pitch_z] = std::tuple(pitch_mm_[0], pitch_mm_[1], pitch_mm_[2]);
+  const Floats band = Floats{} + static_cast<float>(band_mm);
+  const auto side = static_cast<float>(own);
+  const auto depth = static_cast<float>(depth_mm);
+  const auto half_diameter = static_cast<float>(half_diameter_mm);
+  const auto rounding = static_cast<float>(0.02 * rise_all_mm);
+  const auto per_radius = static_cast<float>(1 / (2 * minimum_radius_mm));
+  const auto rise_z = static_cast<float>(double{normal[2]} * pitch_z);
+  const auto along2 = static_cast<float>(pitch_z * pitch_z);
+  const Floats rises_z{-rise_z, 0, rise_z, 0};
+  const Floats squares_z{along2, 0, along2, 0};
   for (int i = -1; i <= 1; ++i) {
     for (int j = -1; j <= 1; ++j) {
-      for (int k = -1; k <= 1; ++k) {
-        const openvdb::Vec3d to(pitch_mm_[0] * i, pitch_mm_[1] * j, pitch_mm_[2] * k);
-        const double rise = openvdb::Vec3d(normal).dot(to);
-        const double flat_mm = std::clamp(depth_mm + own * rise, -band_mm, band_mm);
-        const double bend_mm = (to.lengthSqr() - rise * rise) / (2 * minimum_radius_mm);
-        const double there_mm = sample(own, {i, j, k});
-        if (std::min(flat_mm, there_mm) < half_diameter_mm &&
-            std::abs(flat_mm - there_mm) > bend_mm + 0.02 * rise_all_mm)
-          return false;
-      }
+      const auto across =
+          static_cast<float>(double{normal[0]} * pitch_x * i + double{normal[1]} * pitch_y * j);
+      const auto across2 =
+          static_cast<float>(pitch_x * pitch_x * (i * i) + pitch_y * pitch_y * (j * j));
+      const Floats rise = rises_z + across;
+      const Floats flat = clamped(rise * side + depth, band);
+      const Floats bend = (squares_z + across2 - rise * rise) * per_radius + rounding;
+      const Floats there =
+          clamped(loadFloats(here + i * At::stride_x + j * At::stride_y - 1) * side, band);
+      const Floats nearer = lesserOf(flat, there);
+      const FloatBits bent = (nearer < half_diameter) & (greaterOf(flat, there) - nearer > bend);
+      if ((bent[0] | bent[1] | bent[2]) != 0) return false;
     }
   }
   return true;

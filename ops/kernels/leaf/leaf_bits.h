@@ -96,6 +96,13 @@ inline LeafBits bandBits(const FloatLeaf& leaf, float bound, std::uint8_t row) {
   return bits;
 }
 
+/// The number of set bits.
+inline std::size_t countOf(const LeafBits& bits) {
+  std::size_t count = 0;
+  for (const std::uint64_t word : bits) count += static_cast<std::size_t>(std::popcount(word));
+  return count;
+}
+
 /// Calls `visit(offset)` for every set bit, in rising order of the offset in the leaf.
 template <typename Visit>
 void forEachBit(const LeafBits& bits, Visit visit) {

@@ -1,9 +1,6 @@
 #include "tests/bench/dither_quality/methods.h"
 
-#include <array>
 #include <cmath>
-#include <map>
-#include <memory>
 #include <utility>
 
 #include "ops/kernels/dither/voxel_diameter.h"
@@ -31,14 +28,6 @@ Method ruled(const std::string& name, Rule rule) {
           }};
 }
 
-/// Made once for each lattice and spread.
-std::shared_ptr<const AdaptedAmplitude> adaptedTo(const Vec3d& pitch_mm, double spread_mm) {
-  static std::map<std::array<double, 4>, std::shared_ptr<const AdaptedAmplitude>> known;
-  auto& adapted = known[{pitch_mm.x(), pitch_mm.y(), pitch_mm.z(), spread_mm}];
-  if (!adapted) adapted = std::make_shared<AdaptedAmplitude>(pitch_mm, spread_mm);
-  return adapted;
-}
-
 Method triangular(const ThresholdMask& mask) {
   return ruled("triangular 2", [&mask](const Part& part, const Coord& v, double d) {
     const double M = mask(v);
@@ -63,14 +52,21 @@ Method interlacing() {
 }  // namespace
 
 Method dithered(const std::string& name, const ThresholdMask& mask, double amplitude, DitherAt at,
-                bool adapted, bool guarded, double spread_mm) {
+                bool guarded) {
   return {name, [=](const Part& part, const FloatGrid& surface) {
             ShapeDither dither{part.lattice.pitch_mm, amplitude, at, mask};
-            if (adapted) dither.adapted = adaptedTo(part.lattice.pitch_mm, spread_mm);
             dither.guarded = guarded;
             const ZRange layers = part.lattice.layers();
             return test::dense(*dither.run(surface, nullptr, layers, layers, false).solid,
                                part.lattice.box);
+          }};
+}
+
+Method diffused(const std::string& name, bool guarded, double spread_mm) {
+  return {name, [=](const Part& part, const FloatGrid& surface) {
+            const ErrorDiffusion dither(part.lattice.pitch_mm, Vec3d(spread_mm), guarded);
+            const ZRange layers = part.lattice.layers();
+            return test::dense(*dither.run(surface, nullptr, layers, layers), part.lattice.box);
           }};
 }
 
@@ -92,9 +88,8 @@ std::vector<Method> methodsFor(const Masks& masks, bool every) {
   const ThresholdMask& mask = masks.ours;
   std::vector<Method> methods{control(), interlacing(),
                               dithered("paper", masks.papers, 4, DitherAt::closest),
-                              dithered("best", mask, 2, DitherAt::voxel, true, true)};
+                              diffused("best", true)};
   if (!every) return methods;
-  methods.push_back(dithered("best, paper's mask", masks.papers, 2, DitherAt::voxel, true, true));
   methods.push_back(dithered("4 closest", mask, 4, DitherAt::closest));
   methods.push_back(dithered("2 voxel, paper's mask", masks.papers, 2, DitherAt::voxel));
   methods.push_back(dithered("4 foot", mask, 4, DitherAt::foot));
@@ -107,9 +102,9 @@ std::vector<Method> methodsFor(const Masks& masks, bool every) {
     methods.push_back(dithered(shortestText(amplitude) + " foot", mask, amplitude, DitherAt::foot));
   methods.push_back(triangular(mask));
   methods.push_back(coverage(mask));
-  methods.push_back(dithered("best 25", mask, 2, DitherAt::voxel, true, true, 0.025));
-  methods.push_back(dithered("best 100", mask, 2, DitherAt::voxel, true, true, 0.1));
-  methods.push_back(dithered("best unguarded", mask, 2, DitherAt::voxel, true, false));
+  methods.push_back(diffused("best 25", true, 0.025));
+  methods.push_back(diffused("best 100", true, 0.1));
+  methods.push_back(diffused("best unguarded", false));
   return methods;
 }
 

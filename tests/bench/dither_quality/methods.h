@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "ops/kernels/dither/error_diffusion.h"
 #include "ops/kernels/dither/shape_dither.h"
 #include "tests/bench/dither_quality/parts.h"
 
@@ -16,7 +17,10 @@ struct Method {
 };
 
 Method dithered(const std::string& name, const ThresholdMask& mask, double amplitude, DitherAt at,
-                bool adapted = false, bool guarded = false, double spread_mm = 0.05);
+                bool guarded = false);
+
+/// Error diffusion.
+Method diffused(const std::string& name, bool guarded, double spread_mm = 0.05);
 
 /// The share of the voxel that the part covers, by sub-samples, against the threshold.
 Method coverage(const ThresholdMask& mask);

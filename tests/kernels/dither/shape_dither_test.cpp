@@ -267,18 +267,5 @@ TEST(ShapeDither, IsPlainVoxelizationWithoutAmplitude) {
   EXPECT_EQ(voxels.plain, voxels.dithered);
 }
 
-TEST(ShapeDither, SphereVolumeIsUnbiased) {
-  for (const Vec3d& pitch_mm : test::testPitches()) {
-    const double radius = 2.6;
-    const test::TestShape sphere{"sphere", test::sphere({0.013, -0.02, 0.007}, radius),
-                                 Vec3d(radius)};
-    const test::Printed voxels = test::printed(test::defaultDither(pitch_mm), sphere);
-    double count = 0;
-    for (auto v = voxels.dithered.box().begin(); v; ++v) count += voxels.dithered[*v];
-    const double truth = 4 * std::acos(-1.0) / 3 * radius * radius * radius;
-    EXPECT_NEAR(count * pitch_mm.product() / truth, 1, 2e-4) << pitch_mm;
-  }
-}
-
 }  // namespace
 }  // namespace vdbdither

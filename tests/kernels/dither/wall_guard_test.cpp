@@ -64,13 +64,18 @@ bool referenceGuard(const FloatGrid& surface, const Coord& v, const Vec3d& norma
   return true;
 }
 
-TEST(WallGuard, AdaptedAndGuardedEqualsItsDefinitionInDoublePrecision) {
+/// One step of thresholds, guarded.
+ShapeDither guardedDither(const Vec3d& pitch_mm, bool guarded = true) {
+  return {pitch_mm, 2, DitherAt::voxel, test::permutationMask(16), guarded};
+}
+
+TEST(WallGuard, GuardedDitherEqualsItsDefinitionInDoublePrecision) {
   int all_spared = 0;
   int all_overturned = 0;
   for (const Vec3d& pitch_mm : test::testPitches()) {
     for (const test::TestShape& shape : test::testShapes()) {
       SCOPED_TRACE(shape.name);
-      const ShapeDither dither = test::defaultDither(pitch_mm);
+      const ShapeDither dither = guardedDither(pitch_mm);
       const Lattice lattice = test::latticeAround(pitch_mm, shape.extent_mm, 0.15);
       const auto surface = test::sampled(shape.distance, lattice, test::bandFor(dither));
       const auto normals = outwardNormals(*surface, pitch_mm, lattice.layers(), lattice.layers());
@@ -83,11 +88,8 @@ TEST(WallGuard, AdaptedAndGuardedEqualsItsDefinitionInDoublePrecision) {
       for (auto voxel = surface->cbeginValueOn(); voxel; ++voxel) {
         const Coord v = voxel.getCoord();
         const Vec3d normal(normals->tree().getValue(v));
-        const FacetDither facet = (*dither.adapted)(openvdb::Vec3s(normal));
         const double k_D = test::halfDiameter(normal, pitch_mm);
-        const int parity = (v.x() + v.y() + v.z()) % 2 != 0 ? 1 : -1;
-        const double f =
-            k_D * (facet.checker * parity / 2.0 + facet.amplitude * (double{dither.mask(v)} - 0.5));
+        const double f = 2 * k_D * (double{dither.mask(v)} - 0.5);
         const double d = *voxel;
         if (std::abs(d + f) < 1e-7) continue;
         bool printed = d + f < 0;
@@ -110,8 +112,8 @@ TEST(WallGuard, AdaptedAndGuardedEqualsItsDefinitionInDoublePrecision) {
 TEST(WallGuard, TheGuardChangesNothingOnASurfaceThatIsThickEverywhere) {
   for (const Vec3d& pitch_mm : test::testPitches()) {
     for (const test::TestShape& shape : {test::ballShape(), test::ringShape()})
-      EXPECT_EQ(test::printed(test::defaultDither(pitch_mm), shape).dithered,
-                test::printed(test::defaultDither(pitch_mm, false), shape).dithered);
+      EXPECT_EQ(test::printedByDefault(pitch_mm, shape).dithered,
+                test::printedByDefault(pitch_mm, shape, false).dithered);
   }
 }
 
@@ -125,7 +127,7 @@ TEST(WallGuard, TheGuardNeedsNoWiderBandThanOneDiameter) {
       const auto made = MeshDistance(mesh, lattice, Band{}).run(lattice.layers());
       const auto solid = [&](bool guarded) {
         return test::dense(
-            *test::defaultDither(pitch_mm, guarded)
+            *guardedDither(pitch_mm, guarded)
                  .run(*made.surface, nullptr, lattice.layers(), lattice.layers(), false)
                  .solid,
             lattice.box);
@@ -140,7 +142,7 @@ TEST(WallGuard, AxisAlignedFacetsOnLatticePlanesAreNotDithered) {
     // Faces half way between the centres of voxels.
     const Vec3d half(8.5 * pitch_mm.x(), 5.5 * pitch_mm.y(), 11.5 * pitch_mm.z());
     const test::TestShape block{"block", test::box(Vec3d(0.0), half), half};
-    const test::Printed voxels = test::printed(test::defaultDither(pitch_mm), block);
+    const test::Printed voxels = test::printedByDefault(pitch_mm, block);
     EXPECT_EQ(voxels.dithered, voxels.plain);
   }
 }
@@ -210,7 +212,7 @@ TEST(WallGuard, ThinWallsAreNotOpened) {
           return
               [=](const Vec3d& at) { return thickness / 2 + 2 * diameter - side * normal.dot(at); };
         };
-        const test::Printed voxels_of = test::printed(test::defaultDither(pitch_mm), plate);
+        const test::Printed voxels_of = test::printedByDefault(pitch_mm, plate);
         if (isTunnelled(voxels_of.plain, lattice, inside, beyond(1), beyond(-1))) continue;
         ++checked;
         EXPECT_FALSE(isTunnelled(voxels_of.dithered, lattice, inside, beyond(1), beyond(-1)))
@@ -233,8 +235,8 @@ TEST(WallGuard, OpensThinWallsWithoutTheGuard) {
   const test::Printed voxels =
       test::printed({pitch_mm, 4, DitherAt::closest, test::permutationMask(16)}, plate);
   EXPECT_FALSE(isTunnelled(voxels.plain, lattice, inside, above, below));
-  EXPECT_FALSE(isTunnelled(test::printed(test::defaultDither(pitch_mm), plate).dithered, lattice,
-                           inside, above, below));
+  EXPECT_FALSE(
+      isTunnelled(test::printedByDefault(pitch_mm, plate).dithered, lattice, inside, above, below));
   EXPECT_TRUE(isTunnelled(voxels.dithered, lattice, inside, above, below));
 }
 
@@ -255,7 +257,7 @@ TEST(WallGuard, NoBarsFuse) {
                                      return std::min({bars[0](at), bars[1](at), bars[2](at)});
                                    },
                                    Vec3d(1.0)};
-        test::Printed voxels = test::printed(test::defaultDither(pitch_mm), comb);
+        test::Printed voxels = test::printedByDefault(pitch_mm, comb);
         if (components(voxels.plain, Touching::corners) != 3) continue;
         ++checked;
         fused_at_ends += components(voxels.dithered, Touching::corners) != 3;
@@ -300,7 +302,7 @@ TEST(WallGuard, MakesNoComponentsOrCavitiesBeyondThePlainOnes) {
                     Vec3d(0.7)});
   for (const Vec3d& pitch_mm : test::testPitches()) {
     for (const test::TestShape& piece : pieces) {
-      const test::Printed voxels = test::printed(test::defaultDither(pitch_mm), piece);
+      const test::Printed voxels = test::printedByDefault(pitch_mm, piece);
       EXPECT_EQ(components(voxels.dithered, Touching::corners),
                 components(voxels.plain, Touching::corners))
           << piece.name << " " << pitch_mm;

@@ -1,0 +1,71 @@
+// Error diffusion goes back to Floyd and Steinberg: An Adaptive Algorithm for Spatial Greyscale,
+// Proceedings of the Society for Information Display 17(2), 1976; a parallel order in blocks to
+// Zhang et al. and others for images. The error is weighed as direct binary search weighs it:
+// Analoui, Allebach: Model-based halftoning using direct binary search, SPIE 1666, 1992.
+
+#include "ops/kernels/dither/error_diffusion.h"
+
+#include "ops/kernels/leaf/solid.h"
+
+namespace vdbdither {
+
+using openvdb::Vec3d;
+
+namespace {
+
+/// The maximum distance of two voxels that count for each other, in σ.
+constexpr double reach_in_spreads = 3.3;
+
+/// Only the voxels decided before count, on one side of each; the errors of those that follow are
+/// open. A factor above one makes up for them.
+constexpr double feedback = 1.2;
+
+/// Slightly wider hills than those of σ serve a process that is blunter than stated, too.
+constexpr double width = 1.1;
+
+/// Decides the voxels of a leaf in the order of the leaf.
+void diffuse(OpenLeaf& leaf, OpenSurroundings& around) {
+  OpenVoxel* voxel = leaf.voxels.data();
+  forEachBit(leaf.open, [&](unsigned offset) {
+    const openvdb::Coord ijk = leaf.leaf->offsetToGlobalCoord(offset);
+    const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
+    std::uint64_t& printed = leaf.printed[offset / 64];
+    if ((leaf.free[offset / 64] & bit) != 0) {
+      const bool above = voxel->tone > 0.5F + around.sum(ijk, voxel->depth);
+      printed = above ? printed | bit : printed & ~bit;
+    }
+    voxel->error = ((printed & bit) != 0 ? 1.0F : 0.0F) - voxel->tone;
+    around.set(ijk, *voxel);
+    ++voxel;
+  });
+  leaf.decided = true;
+}
+
+}  // namespace
+
+ErrorDiffusion::ErrorDiffusion(const Vec3d& pitch_mm, const Vec3d& spread_mm, bool guarded)
+    : settings_{pitch_mm, spread_mm, guarded},
+      kernel_(pitch_mm, spread_mm, {{width, feedback}}, reach_in_spreads),
+      order_(kernel_.reach()) {}
+
+int ErrorDiffusion::reachLayers() const {
+  return order_.reachLayers() + OpenLeaves::reachLayers(settings_.guarded);
+}
+
+openvdb::BoolGrid::Ptr ErrorDiffusion::run(const openvdb::FloatGrid& surface,
+                                           const openvdb::Vec3SGrid* normals, ZRange core,
+                                           ZRange valid) const {
+  OpenLeaves leaves(surface, normals, settings_, order_, intersection(order_.needed(core), valid),
+                    valid);
+  leaves.visitInOrder(order_.needed(core), [&] {
+    return [find = OpenLeaves::Finder(leaves),
+            around = OpenSurroundings(kernel_, order_)](OpenLeaves::Block block) mutable {
+      around.visit(*block.front(), find);
+      for (OpenLeaf* leaf : block) diffuse(*leaf, around);
+    };
+  });
+  return makeSolidGrid(surface.transform(), leaves.printed(core),
+                       insideTiles(surface.tree(), core));
+}
+
+}  // namespace vdbdither

@@ -1,0 +1,156 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <openvdb/openvdb.h>
+#include <tbb/enumerable_thread_specific.h>
+
+#include "ops/kernels/dither/block_order.h"
+#include "ops/kernels/dither/height_kernel.h"
+#include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/solid.h"
+
+namespace vdbdither {
+
+/// A voxel that can be printed or not: |d| < k_D.
+struct OpenVoxel {
+  float depth;  ///< d/σ, with the blur σ along the normal of the facet
+  float tone;   ///< the share that is to be printed of voxels like this one
+  float error;  ///< printed or not, 1 or 0, minus the tone, once this is decided
+};
+
+/// The open voxels of a leaf, in the order of the leaf.
+struct OpenLeaf {
+  const FloatLeaf* leaf;
+  LeafBits open{};
+  LeafBits free{};     ///< the open voxels that the guard allows to change
+  LeafBits printed{};  ///< all voxels; those of the plain voxelization until they are decided
+  bool decided = false;
+  std::vector<OpenVoxel> voxels;
+};
+
+/// The open voxels of a range of layers.
+class OpenLeaves {
+ public:
+  struct Settings {
+    openvdb::Vec3d pitch_mm;
+    openvdb::Vec3d spread_mm;  ///< the blur of the process along each axis
+    bool guarded = false;      ///< whether WallGuard decides which voxels are free
+  };
+
+  /// The maximum number of layers around a voxel that decide whether it is open and free.
+  static int reachLayers(bool guarded);
+
+  /// \param surface  d in mm; its band must hold k_D
+  /// \param normals  the grid `N`, or null to use the gradient
+  /// \param layers  whose leaves are held
+  /// \param valid  the layers that can be read; others are outside the part
+  OpenLeaves(const openvdb::FloatGrid& surface, const openvdb::Vec3SGrid* normals,
+             const Settings& settings, const BlockOrder& order, ZRange layers, ZRange valid);
+
+  /// The leaves of a block, in the order of the tree.
+  using Block = std::span<OpenLeaf* const>;
+
+  /// Finds leaves by their origins.
+  class Finder {
+   public:
+    explicit Finder(const OpenLeaves& leaves)
+        : leaves_(leaves.leaves_), numbers_(leaves.numbers_) {}
+    /// Returns the leaf at `origin`, or null.
+    const OpenLeaf* operator()(const openvdb::Coord& origin) {
+      const openvdb::Int32 number = numbers_.getValue(origin >> leaf_shift);
+      return number < 0 ? nullptr : &leaves_[static_cast<std::size_t>(number)];
+    }
+
+   private:
+    const std::vector<OpenLeaf>& leaves_;
+    openvdb::tree::ValueAccessor<const openvdb::Int32Tree, false> numbers_;
+  };
+
+  /// The printed voxels within `core`, by leaves.
+  [[nodiscard]] std::vector<SolidLeaf> printed(ZRange core) const;
+
+  /// Visits every leaf, all of them in parallel.
+  template <typename Visit>
+  void visitAtOnce(const Visit& visit) {
+    tbb::parallel_for(std::size_t{0}, leaves_.size(), [&](std::size_t n) { visit(leaves_[n]); });
+  }
+
+  /// Visits every block within `range`, which consists of whole blocks, in the order of BlockOrder.
+  /// Blocks of one colour, and layers of blocks of one parity, run in parallel: one layer at a time
+  /// stays in the cache of a processor. `make_worker()` is called once for each thread and returns
+  /// a function of a Block.
+  template <typename MakeWorker>
+  void visitInOrder(ZRange range, const MakeWorker& make_worker) {
+    using Range = tbb::blocked_range<std::size_t>;
+    tbb::enumerable_thread_specific<decltype(make_worker())> workers(make_worker);
+    for (const std::vector<Layer>& layers : layers_) {
+      tbb::parallel_for(Range(0, layers.size()), [&](const Range& some_layers) {
+        for (std::size_t n = some_layers.begin(); n != some_layers.end(); ++n) {
+          if (!range.contains(layers[n].bottom)) continue;
+          for (const Blocks& blocks : layers[n].blocks) {
+            tbb::parallel_for(Range(0, blocks.size()), [&](const Range& some_blocks) {
+              auto& visit = workers.local();
+              for (std::size_t m = some_blocks.begin(); m != some_blocks.end(); ++m)
+                visit(blocks[m]);
+            });
+          }
+        }
+      });
+    }
+  }
+
+ private:
+  static constexpr openvdb::Index leaf_shift = FloatLeaf::LOG2DIM;
+
+  std::vector<OpenLeaf> leaves_;      ///< in the order of the tree
+  std::vector<OpenLeaf*> in_blocks_;  ///< the same by blocks
+  openvdb::Int32Tree numbers_{-1};  ///< indices of `leaves_`, by the indices of the leaves in space
+  void order(const BlockOrder& order);
+
+  using Blocks = std::vector<Block>;
+  struct Layer {
+    int bottom;                                          ///< its lowest layer of voxels
+    std::array<Blocks, BlockOrder::colours / 2> blocks;  ///< by the colours of its parity
+  };
+  std::array<std::vector<Layer>, 2> layers_;  ///< by parity
+};
+
+/// The open voxels of a block and of those around it, within the reach of a kernel, for sums over
+/// their errors.
+class OpenSurroundings {
+ public:
+  OpenSurroundings(const HeightKernel& kernel, const BlockOrder& order);
+
+  /// Moves to the block that holds `leaf` and reads the decided voxels in and around it.
+  void visit(const OpenLeaf& leaf, OpenLeaves::Finder& leaves);
+
+  /// Adds the decided voxel at `ijk`, which lies in the block, or replaces it.
+  void set(const openvdb::Coord& ijk, const OpenVoxel& voxel);
+
+  /// Returns Σ q·w over the voxels that are there, as seen from a voxel of the block.
+  [[nodiscard]] float sum(const openvdb::Coord& ijk, float depth) const;
+
+ private:
+  void read(const OpenLeaf& leaf, const openvdb::Coord& from);
+  template <typename Weigh>
+  [[nodiscard]] float sumOf(const openvdb::Coord& at, float depth, Weigh weigh) const;
+  [[nodiscard]] std::size_t columnOf(int x, int y) const {
+    return static_cast<std::size_t>(x * edges_.y() + y);
+  }
+
+  const HeightKernel& kernel_;
+  const BlockOrder& order_;
+  openvdb::Coord reach_;
+  openvdb::Coord edges_;
+  openvdb::Coord lowest_;               ///< the voxel at the corner of what is held
+  std::size_t stride_;                  ///< from column to column
+  std::vector<std::uint64_t> present_;  ///< by column along z
+  std::vector<float> depths_;
+  std::vector<float> errors_;  ///< zero where no voxel is
+};
+
+}  // namespace vdbdither

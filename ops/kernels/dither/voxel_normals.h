@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include <openvdb/openvdb.h>
+
+#include "ops/kernels/distance/gradient.h"
+#include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/leaf_surroundings.h"
+#include "vdbdither/model/lattice.h"
+
+namespace vdbdither {
+
+using NormalAccessor = openvdb::tree::ValueAccessor<const openvdb::Vec3STree, false>;
+
+/// The normals of one leaf's voxels: those given, or those of the gradient, computed row by row on
+/// demand.
+class VoxelNormals {
+ public:
+  /// \param surface  distances in mm
+  /// \param given  the normals, or null to use the gradient
+  /// \param valid  the layers that can be read
+  VoxelNormals(const openvdb::FloatTree& surface, const openvdb::Vec3d& pitch_mm,
+               const openvdb::Vec3STree* given, ZRange valid);
+
+  /// Prepares for the `wanted` voxels of `leaf`.
+  void visit(const FloatLeaf& leaf, const LeafBits& wanted);
+
+  /// The distances in the leaf and around it.
+  const LeafSurroundings& around();
+
+  /// Returns the normal of the active voxel at `offset`.
+  openvdb::Vec3s operator()(unsigned offset) {
+    if (given_) return given_->getValue(leaf_->offsetToGlobalCoord(offset));
+    makeRow(offset / 8);
+    return {normals_[0][offset], normals_[1][offset], normals_[2][offset]};
+  }
+
+  /// Returns those of `undecided` that are within `reach`·k_D of the surface along their normal,
+  /// and perhaps others.
+  LeafBits within(const LeafBits& undecided, double reach);
+
+ private:
+  void makeRow(unsigned row);
+
+  LeafNormals gradient_;
+  std::optional<NormalAccessor> given_;
+  openvdb::Vec3f per_pitch_;
+  const FloatLeaf* leaf_ = nullptr;
+  LeafBits wanted_{};
+  bool visited_ = false;
+  std::uint64_t rows_made_ = 0;  ///< one bit per row along z, in the order of the leaf
+  std::array<std::array<float, 512>, 3> normals_{};
+};
+
+}  // namespace vdbdither

@@ -1,0 +1,42 @@
+#pragma once
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
+#include <cstdint>
+#include <cstring>
+
+namespace vdbdither {
+
+/// Four floats that are computed together; every lane has the bits that a float would have.
+using Floats = float __attribute__((vector_size(16)));
+/// The result of a comparison: all ones where it holds, else zero.
+using FloatBits = std::int32_t __attribute__((vector_size(16)));
+
+/// The four values from `from` on.
+inline Floats loadFloats(const float* from) {
+  Floats values;
+  std::memcpy(&values, from, sizeof values);
+  return values;
+}
+
+/// The lesser of each two; of values that are neither NaN nor zeros of different signs.
+inline Floats lesserOf(Floats a, Floats b) {
+#ifdef __SSE2__
+  return _mm_min_ps(a, b);
+#else
+  return a < b ? a : b;
+#endif
+}
+
+/// The greater of each two; of values that are neither NaN nor zeros of different signs.
+inline Floats greaterOf(Floats a, Floats b) {
+#ifdef __SSE2__
+  return _mm_max_ps(a, b);
+#else
+  return a > b ? a : b;
+#endif
+}
+
+}  // namespace vdbdither
