@@ -36,6 +36,8 @@ class Compensate : public Filter {
   Schema plan(const Schema& in) override {
     const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
     if (!spread_mm_) spread_mm_ = usualSpreadMm(in);
+    if (spread_mm_->isZero())
+      throw UsageError("--spread: must be above 0 mm along an axis; leave the operator out");
     const openvdb::Coord reach = GaussianSpread(in.lattice.pitch_mm, *spread_mm_).reach();
     if (std::max({reach.x(), reach.y(), reach.z()}) > most_reach)
       throw UsageError("--spread: the droplets would reach over more than " +

@@ -20,6 +20,7 @@
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/leaf_origins.h"
 #include "ops/kernels/leaf/leaf_window.h"
+#include "ops/kernels/leaf/simple_point.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/surface_leaves.h"
 #include "ops/kernels/printing/gaussian_spread.h"
@@ -44,6 +45,9 @@ constexpr double zero_from = 7;
 constexpr int search_steps = 8;
 /// A shorter gradient is that of a voxel near the medial axis.
 constexpr double minimum_slope = 0.5;
+/// How often every voxel is asked whether it can change its side; in each sweep, a change depends
+/// on voxels up to eight away.
+constexpr int sweeps = 2;
 
 /// A foot is at most zero_from / 2 voxels away along each axis, and interpolation takes two more.
 constexpr int tap_halo = 6;
@@ -158,6 +162,32 @@ float interpolated(const LeafWindow& window, const Vec3s& place) {
   return sum;
 }
 
+/// The sides of voxels while some of them change.
+class Sides {
+ public:
+  /// Leaves of `changed` stand in for those of `surface`.
+  Sides(const FloatTree& surface, const FloatTree& changed, ZRange valid)
+      : surface_(surface), changed_(changed), valid_(valid) {}
+
+  /// Returns the bits of the voxels around `ijk` that are inside.
+  [[nodiscard]] std::uint32_t inside(const Coord& ijk) {
+    std::uint32_t bits = 0;
+    for (const Coord& step : CoordBBox(Coord(-1), Coord(1))) {
+      const Coord there = ijk + step;
+      if (!valid_.contains(there.z())) continue;
+      const FloatLeaf* leaf = changed_.probeConstLeaf(there);
+      const float side = leaf ? leaf->getValue(there) : surface_.getValue(there);
+      bits |= std::uint32_t{side < 0} << neighbourBit(step.x(), step.y(), step.z());
+    }
+    return bits;
+  }
+
+ private:
+  openvdb::tree::ValueAccessor<const FloatTree, false> surface_;
+  openvdb::tree::ValueAccessor<const FloatTree, false> changed_;
+  ZRange valid_;
+};
+
 /// The computation over one slab.
 class Run {
  public:
@@ -170,7 +200,7 @@ class Run {
         valid_(valid),
         spread_(pitch_mm_, settings.spread_mm),
         shares_(0.0F),
-        corrections_(0.0F) {}
+        corrections_(std::make_unique<FloatTree>(0.0F)) {}
 
   FloatGrid::Ptr operator()() {
     const int first_around = around(settings_.steps - 1);
@@ -180,7 +210,8 @@ class Run {
       const ZRange layers = layersAround(around(left));
       const bool first = left + 1 == settings_.steps;
       correct(quantiles(layers), layers, first);
-      writeCorrections();
+      if (left == 0) keepTopology();
+      corrections_ = treeOf([](const Detail& detail) { return detail.e_mm; }, 0);
       if (first) findNeighbours();
       updateNeighbours();
       if (left > 0) updateShares();
@@ -188,9 +219,10 @@ class Run {
     return result();
   }
 
-  /// The layers around the core in which details are corrected `left` steps before the last.
+  /// The layers around the core in which details are corrected `left` steps before the last. The
+  /// topology makes a voxel depend on more, and a neighbour depends on one layer more.
   [[nodiscard]] int around(int left) const {
-    return 1 + left * (1 + tap_halo + spread_.reach().z());
+    return 1 + 8 * sweeps + left * (1 + tap_halo + spread_.reach().z());
   }
   [[nodiscard]] int reach() const {
     const int first = around(settings_.steps - 1);
@@ -347,7 +379,8 @@ class Run {
           const double sigma_mm = (Vec3d(detail.normal) * settings_.spread_mm).length();
           const double missed_mm = -sigma_mm * double{interpolated(taps, detail.foot)};
           if (first) {
-            detail.gain = static_cast<float>(gainOf(std::abs(missed_mm) / sigma_mm));
+            detail.gain =
+                sigma_mm > 0 ? static_cast<float>(gainOf(std::abs(missed_mm) / sigma_mm)) : 0.0F;
             if (!(detail.gain > 0)) continue;
             if (!has_distances) distances.visit(leaf.origin);
             has_distances = true;
@@ -370,10 +403,14 @@ class Run {
   }
 
   void limit(Detail& detail, const LeafWindow& distances) const {
-    const double half = double{detail.half_diameter_mm};
+    // Just less than a diameter, so that no voxel outside the band changes its side.
+    const double diameter_mm = 2 * (1 - 1e-3) * double{detail.half_diameter_mm};
+    double rise_mm = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      rise_mm += std::abs(double{detail.normal[axis]}) * pitch_mm_[axis];
     const auto limitTowards = [&](int side) {
       const double medial_mm = medialAxisMm(detail, distances, side);
-      return std::max(0.0, std::min({2 * half, medial_mm / 2, medial_mm - half}));
+      return std::max(0.0, std::min({diameter_mm, medial_mm / 2, medial_mm - rise_mm / 2}));
     };
     detail.most_mm = static_cast<float>(limitTowards(1));
     detail.least_mm = static_cast<float>(-limitTowards(-1));
@@ -397,14 +434,57 @@ class Run {
     return nearest;
   }
 
-  void writeCorrections() {
-    corrections_.clear();
+  /// Returns a tree with a value for each detail.
+  template <typename ValueOf>
+  [[nodiscard]] std::unique_ptr<FloatTree> treeOf(const ValueOf& value_of, float background) const {
+    auto tree = std::make_unique<FloatTree>(background);
     for (const DetailLeaf& leaf : leaves_) {
       if (leaf.details.empty()) continue;
-      auto made = std::make_unique<FloatLeaf>(leaf.origin, 0.0F);
-      for (const Detail& detail : leaf.details) made->setValueOn(detail.offset, detail.e_mm);
-      corrections_.addLeaf(made.release());
+      auto made = std::make_unique<FloatLeaf>(leaf.origin, background);
+      for (const Detail& detail : leaf.details) made->setValueOn(detail.offset, value_of(detail));
+      tree->addLeaf(made.release());
     }
+    return tree;
+  }
+
+  /// Lets those voxels change their sides that are simple points, one after another, and leaves the
+  /// distances of the others as they are. Voxels of equal parities of x, y and z do not touch, so
+  /// that all of them can change at once.
+  void keepTopology() {
+    const auto changes = [](const Detail& one) {
+      return (one.d_mm < 0) != (static_cast<float>(one.corrected()) < 0);
+    };
+    FloatTree sides(background_);
+    for (const DetailLeaf& leaf : leaves_) {
+      if (std::none_of(leaf.details.begin(), leaf.details.end(), changes)) continue;
+      const FloatLeaf* before = surface_.tree().probeConstLeaf(leaf.origin);
+      sides.addLeaf(new FloatLeaf(*before));
+    }
+    for (int turn = 0; turn < 8 * sweeps; ++turn) {
+      forEachLeaf([&] {
+        return [&, around = Sides(surface_.tree(), sides, valid_)](DetailLeaf& leaf) mutable {
+          FloatLeaf* own = sides.probeLeaf(leaf.origin);
+          if (!own) return;
+          for (const Detail& detail : leaf.details) {
+            const Coord ijk = leaf.origin + FloatLeaf::offsetToLocalCoord(detail.offset);
+            const int parity = (ijk.x() & 1) * 4 + (ijk.y() & 1) * 2 + (ijk.z() & 1);
+            float& side = own->buffer().data()[detail.offset];
+            if (parity != turn % 8 || (side < 0) != (detail.d_mm < 0) || !changes(detail)) continue;
+            if (isSimplePoint(around.inside(ijk))) side = static_cast<float>(detail.corrected());
+          }
+        };
+      });
+    }
+    forEachLeaf([&] {
+      return [&](DetailLeaf& leaf) {
+        const FloatLeaf* own = sides.probeConstLeaf(leaf.origin);
+        if (!own) return;
+        for (Detail& detail : leaf.details) {
+          if (changes(detail) && (own->getValue(detail.offset) < 0) == (detail.d_mm < 0))
+            detail.e_mm = 0;
+        }
+      };
+    });
   }
 
   /// Finds the voxels of unknown distance next to details.
@@ -432,7 +512,7 @@ class Run {
     leaves_ = std::move(all);
     forEachLeaf([&] {
       return [&, distances = LeafWindow(surface_.tree(), Coord(2), valid_),
-              corrections = LeafWindow(corrections_, Coord(1), valid_)](DetailLeaf& leaf) mutable {
+              corrections = LeafWindow(*corrections_, Coord(1), valid_)](DetailLeaf& leaf) mutable {
         distances.visit(leaf.origin);
         corrections.visit(leaf.origin);
         for (unsigned offset = 0; offset < 512; ++offset) {
@@ -462,15 +542,18 @@ class Run {
     if (nearest == background_) return;
     const float* d = distances.at(of.x(), of.y(), of.z());
     const Vec3d normal = unitGradient(d, stridesOf(distances), background_, pitch_mm_);
-    const double flat = double{*d} + normal.dot((local - of).asVec3d() * pitch_mm_);
-    if ((flat < 0) != inside || std::abs(flat) >= double{background_}) return;
-    leaf.neighbours.push_back(
-        {offset, detailOf(offset, local, static_cast<float>(flat), normal), leaf.origin + of});
+    const double flat_mm = double{*d} + normal.dot((local - of).asVec3d() * pitch_mm_);
+    // The band holds a diameter.
+    const double depth_mm =
+        std::max(inside ? -flat_mm : flat_mm, 2 * halfDiameter(normal, pitch_mm_));
+    if (depth_mm >= double{background_}) return;
+    const auto d_mm = static_cast<float>(inside ? -depth_mm : depth_mm);
+    leaf.neighbours.push_back({offset, detailOf(offset, local, d_mm, normal), leaf.origin + of});
   }
 
   void updateNeighbours() {
     forEachLeaf([&] {
-      return [corrections = openvdb::tree::ValueAccessor<const FloatTree, false>(corrections_)](
+      return [corrections = openvdb::tree::ValueAccessor<const FloatTree, false>(*corrections_)](
                  DetailLeaf& leaf) {
         for (Neighbour& one : leaf.neighbours) one.as.e_mm = corrections.getValue(one.of);
       };
@@ -537,8 +620,8 @@ class Run {
   GaussianSpread spread_;
   Quantile quantile_;
   FloatTree shares_;
-  FloatTree corrections_;
-  std::vector<DetailLeaf> leaves_;  ///< by rising origin once the neighbours are found
+  std::unique_ptr<FloatTree> corrections_;  ///< e of the details
+  std::vector<DetailLeaf> leaves_;          ///< by rising origin once the neighbours are found
 };
 
 }  // namespace

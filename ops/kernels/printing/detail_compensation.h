@@ -19,9 +19,11 @@ namespace vdbdither {
 /// - |e| ≤ 2·k_D, the voxel's diameter along the normal.
 /// - e = 0 and the bits of d stay where the print misses by less than `quiet_share`·σ, which is the
 ///   case on flat faces and on surfaces whose radius exceeds some 13 σ.
-/// - The surface never reaches the medial axis on the side that it moves to, measured along the
-///   normal: it keeps half of the way there and a half voxel diameter, so that no gap closes and no
-///   wall opens.
+/// - Only simple points change their side, one after another, so that the voxels inside keep their
+///   topology: nothing fuses, nothing opens, and nothing floats.
+/// - The surface stays away from the medial axis on the side that it moves to, measured along the
+///   normal: it keeps half of the way there and half a step between neighbours, so that gaps and
+///   walls stay in the print as well.
 /// - Voxels without a usable normal, such as those in the middle of a gap, do not change.
 /// - Up to 3·k_D from the surface the whole e counts; from there it falls to zero at 7·k_D, so that
 ///   d′ rises steadily and the band stays what it was.
