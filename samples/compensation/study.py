@@ -72,18 +72,19 @@ class Wire:
 
 
 class Stroke:
-    """A bar on a slab whose top is z = 0, or a groove in it; as high as wide, 0.6 mm long."""
+    """A bar on a slab whose top is z = 0, or a groove in it."""
 
     length = 0.6
+    height = 0.25
 
     def __init__(self, width, engraved):
         self.width = width
         self.counts_void = engraved
         margin = 0.1
-        self.reach = numpy.array([width / 2 + margin, self.length / 2 + margin, width + margin])
+        self.reach = numpy.array([width / 2 + margin, self.length / 2 + margin, self.height + margin])
 
     def triangles(self):
-        w, l, h, outer = self.width / 2, self.length / 2, self.width, 0.6
+        w, l, h, outer = self.width / 2, self.length / 2, self.height, 0.6
         slab = ((-outer, -outer, -h - 0.4), (outer, outer, -h if self.counts_void else 0))
         if not self.counts_void:
             boxes = [slab, ((-w, -l, -0.1), (w, l, h))]
@@ -95,8 +96,8 @@ class Stroke:
     def inside(self, local):
         stroke = (numpy.abs(local[..., 0]) < self.width / 2) & (numpy.abs(local[..., 1]) < self.length / 2)
         if self.counts_void:
-            return (local[..., 2] < 0) & ~(stroke & (local[..., 2] > -self.width))
-        return (local[..., 2] < 0) | (stroke & (local[..., 2] < self.width))
+            return (local[..., 2] < 0) & ~(stroke & (local[..., 2] > -self.height))
+        return (local[..., 2] < 0) | (stroke & (local[..., 2] < self.height))
 
     def judged(self, local):
         height = -local[..., 2] if self.counts_void else local[..., 2]

@@ -48,8 +48,15 @@ Distance several(const std::vector<Distance>& parts) {
   };
 }
 
-Distance complementOf(const Distance& part) {
-  return [=](const Vec3d& at) { return -part(at); };
+/// The grid without the distances from `limit_mm` on.
+FloatGrid::Ptr narrowed(const FloatGrid& surface, float limit_mm) {
+  FloatGrid::Ptr grid = surface.deepCopy();
+  for (auto value = grid->beginValueOn(); value; ++value) {
+    if (std::abs(*value) < limit_mm) continue;
+    value.setValue(std::copysign(surface.background(), *value));
+    value.setValueOff();
+  }
+  return grid;
 }
 
 DetailCompensation settingsOn(const Lattice& lattice, int steps = 2) {
@@ -299,14 +306,15 @@ class Reference {
 };
 
 TEST(DetailCompensation, IsWhatTheDefinitionSays) {
+  const Distance hole = wire(Vec3d(0.01, 0, 0), Vec3d(0.3, 1, 0.2), 0.08, 0.2);
   const std::array<Distance, 3> parts{
-      wire(Vec3d(0.01, 0.02, 0), Vec3d(1, 2, 1.5), 0.06),
-      several({test::box(Vec3d(0, 0, -0.2), Vec3d(0.5, 0.5, 0.2), Vec3d(20, 30, 0)),
-               wire(Vec3d(0.1, 0, 0.2), Vec3d(1, 0, 0.3), 0.07)}),
-      complementOf(wire(Vec3d(0.01, 0, 0), Vec3d(0.3, 1, 0.2), 0.08))};
+      wire(Vec3d(0.01, 0.02, 0), Vec3d(1, 2, 1.5), 0.06, 0.25),
+      several({test::box(Vec3d(0, 0, -0.1), Vec3d(0.25, 0.25, 0.1), Vec3d(20, 30, 0)),
+               wire(Vec3d(0.05, 0, 0.1), Vec3d(1, 0, 0.3), 0.07, 0.2)}),
+      [=](const Vec3d& at) { return std::max(at.length() - 0.32, -hole(at)); }};
   for (std::size_t n = 0; n < parts.size(); ++n) {
-    const Lattice lattice = test::latticeAround(mimaki_mm, Vec3d(0.35), 0.05);
-    const auto surface = test::sampled(parts[n], lattice, band_mm);
+    const Lattice lattice = test::latticeAround(mimaki_mm, Vec3d(0.35), 0.2);
+    const auto surface = narrowed(*test::sampled(parts[n], lattice, band_mm), 0.085F);
     for (const int steps : {1, 2}) {
       const ZRange layers = lattice.layers();
       const auto found =
@@ -445,7 +453,8 @@ TEST(DetailCompensation, OpensNoPlates) {
 
 TEST(DetailCompensation, ActivatesVoxelsThatTheSurfaceMovesTo) {
   const Lattice lattice = test::latticeAround(mimaki_mm, Vec3d(0.3), 0.1);
-  const auto surface = test::sampled(wire(Vec3d(0.0), Vec3d(0, 1, 0), 0.06), lattice, band_mm);
+  const auto surface =
+      narrowed(*test::sampled(wire(Vec3d(0.0), Vec3d(0, 1, 0), 0.06), lattice, band_mm), 0.06F);
   const ZRange layers = lattice.layers();
   const auto result = settingsOn(lattice).run(*surface, layers, layers);
   EXPECT_GT(result->activeVoxelCount(), surface->activeVoxelCount());
