@@ -5,7 +5,7 @@ Wires and strokes of random orientation and position are written as STL, dithere
 printed: the voxels, full boxes, are blurred with a Gaussian, exactly, and the print is where the blur is at least ½.
 The judge knows the shapes by their formulas and shares no code with the program.
 
-Usage: study.py [--program build/release/vdbdither] [--seeds 6] [--only wires,strokes,spread]
+Usage: study.py [--program build/release/vdbdither] [--seeds 6] [--only wires,strokes,blocks,spread]
 """
 
 import argparse
@@ -104,6 +104,23 @@ class Stroke:
         return (numpy.abs(local[..., :2]) < self.reach[:2]).all(-1) & (height > 0) & (height < self.reach[2])
 
 
+class Block:
+    """A cube of 0.8 mm, judged as a whole."""
+
+    counts_void = False
+    half = 0.4
+    reach = numpy.array([0.55, 0.55, 0.55])
+
+    def triangles(self):
+        return box_triangles((-self.half,) * 3, (self.half,) * 3)
+
+    def inside(self, local):
+        return (numpy.abs(local) < self.half).all(-1)
+
+    def judged(self, local):
+        return (numpy.abs(local) < self.reach).all(-1)
+
+
 def write_stl(path, triangles):
     with open(path, "wb") as file:
         file.write(b" " * 80 + struct.pack("<I", len(triangles)))
@@ -193,7 +210,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--program", default="build/release/vdbdither")
     parser.add_argument("--seeds", type=int, default=6)
-    parser.add_argument("--only", default="wires,strokes,spread")
+    parser.add_argument("--only", default="wires,strokes,blocks,spread")
     parser.add_argument("--options", default="", help="of compensate")
     arguments = parser.parse_args()
     program = str(pathlib.Path(arguments.program).resolve())
@@ -212,6 +229,8 @@ def main():
             table("Wires", program, folder, wires, seeds, variants)
         if "strokes" in only:
             table("Strokes", program, folder, strokes, seeds, variants)
+        if "blocks" in only:
+            table("Blocks", program, folder, [("cube 0.8 mm", Block)], seeds, variants)
         if "spread" in only:
             for factor in (0.5, 0.7, 1, 1.2, 1.4):
                 assumed = ["compensate", "--spread", f"{1e3 * SIGMA * factor:g}um", "!"]
