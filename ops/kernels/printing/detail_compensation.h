@@ -18,7 +18,7 @@ namespace vdbdither {
 /// Guarantees:
 /// - |e| ≤ 2·k_D, the voxel's diameter along the normal.
 /// - e = 0 and the bits of d stay where the print misses by less than `quiet_share`·σ, which is the
-///   case on flat faces and on surfaces whose radius exceeds some 13 σ.
+///   case on flat faces and on surfaces whose radius exceeds some 20 σ.
 /// - Only simple points change their side, one after another, so that the voxels inside keep their
 ///   topology: nothing fuses, nothing opens, and nothing floats.
 /// - The surface stays away from the medial axis on the side that it moves to, measured along the
