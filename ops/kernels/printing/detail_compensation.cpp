@@ -23,9 +23,9 @@
 #include "ops/kernels/leaf/simple_point.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/surface_leaves.h"
+#include "ops/kernels/printing/blur_quantile.h"
 #include "ops/kernels/printing/gaussian_spread.h"
 #include "ops/kernels/printing/half_space_share.h"
-#include "ops/kernels/printing/normal_distribution.h"
 
 namespace vdbdither {
 
@@ -53,28 +53,6 @@ constexpr int sweeps = 2;
 constexpr int tap_halo = 6;
 /// Search from the foot; k_D along a normal is at most half a voxel along each axis.
 constexpr int search_halo = 9;
-
-constexpr double maximum_quantile = 2.5;
-
-/// Φ⁻¹ within ±maximum_quantile, from a table.
-class Quantile {
- public:
-  Quantile() {
-    for (std::size_t n = 0; n < table_.size(); ++n)
-      table_[n] = static_cast<float>(
-          std::clamp(probit(static_cast<double>(n) / cells), -maximum_quantile, maximum_quantile));
-  }
-  [[nodiscard]] float operator()(float share) const {
-    const float place = std::clamp(share, 0.0F, 1.0F) * cells;
-    const auto cell = std::min(static_cast<int>(place), cells - 1);
-    const float* value = &table_[static_cast<std::size_t>(cell)];
-    return value[0] + (place - static_cast<float>(cell)) * (value[1] - value[0]);
-  }
-
- private:
-  static constexpr int cells = 8192;
-  std::array<float, cells + 1> table_;
-};
 
 /// A voxel whose distance may change.
 struct Detail {
@@ -131,35 +109,6 @@ Vec3d unitGradient(const float* at, const std::array<int, 3>& strides, float bac
   }
   const double length = slope.length();
   return length < minimum_slope ? Vec3d(0.0) : slope / length;
-}
-
-/// The weights of Catmull and Rom's cubic for the samples from −1 to 2.
-std::array<float, 4> cubicWeights(float t) {
-  return {-0.5F * t * (1 - t) * (1 - t), 0.5F * (2 - 5 * t * t + 3 * t * t * t),
-          0.5F * t * (1 + 4 * t - 3 * t * t), -0.5F * t * t * (1 - t)};
-}
-
-float interpolated(const LeafWindow& window, const Vec3s& place) {
-  std::array<int, 3> cell{};
-  std::array<std::array<float, 4>, 3> weights{};
-  for (int axis = 0; axis < 3; ++axis) {
-    const float floor = std::floor(place[axis]);
-    cell[static_cast<std::size_t>(axis)] = static_cast<int>(floor);
-    weights[static_cast<std::size_t>(axis)] = cubicWeights(place[axis] - floor);
-  }
-  const float* first = window.at(cell[0] - 1, cell[1] - 1, cell[2] - 1);
-  float sum = 0;
-  for (std::size_t x = 0; x < 4; ++x) {
-    float sum_x = 0;
-    for (std::size_t y = 0; y < 4; ++y) {
-      const float* row = first + static_cast<std::ptrdiff_t>(x) * window.strideX() +
-                         static_cast<std::ptrdiff_t>(y) * window.strideY();
-      sum_x += weights[1][y] * (weights[2][0] * row[0] + weights[2][1] * row[1] +
-                                weights[2][2] * row[2] + weights[2][3] * row[3]);
-    }
-    sum += weights[0][x] * sum_x;
-  }
-  return sum;
 }
 
 /// The sides of voxels while some of them change.
@@ -618,7 +567,7 @@ class Run {
   ZRange core_;
   ZRange valid_;
   GaussianSpread spread_;
-  Quantile quantile_;
+  BlurQuantile quantile_;
   FloatTree shares_;
   std::unique_ptr<FloatTree> corrections_;  ///< e of the details
   std::vector<DetailLeaf> leaves_;          ///< by rising origin once the neighbours are found
