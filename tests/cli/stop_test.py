@@ -31,6 +31,7 @@ def sink(verb, *arguments, input="solid"):
 # For each verb, a run by the radius of the part in mm, on inputs that `Stopped.make` makes.
 RUNS = {
     "compare": lambda radius: ("compare", f"solid{radius}.vdb", f"solid{radius}.vdb"),
+    "compensate": lambda radius: ("compensate", "-i", f"surface{radius}.vdb", "-o", "out.vdb"),
     "csg": lambda radius: ("csg", "-i", f"surface{radius}.vdb", "--union", f"surface{radius}.vdb", "-o", "out.vdb"),
     "dither": lambda radius: ("dither", "-i", f"surface{radius}.vdb", "-o", "out.vdb"),
     "halftone": lambda radius: ("halftone", "-i", f"coloured{radius}.vdb", "-o", "out.vdb"),
@@ -139,7 +140,7 @@ class Stopped(ProgramTest):
         self.stop_all(("mask", "mesh2sdf", "read", "resample", "slice-import"))
 
     def test_filters_can_be_stopped(self):
-        self.stop_all(("csg", "dither", "halftone", "hollow", "interlace", "material-assign", "normals", "offset", "separate", "simulate"))
+        self.stop_all(("compensate", "csg", "dither", "halftone", "hollow", "interlace", "material-assign", "normals", "offset", "separate", "simulate"))
 
     def test_sinks_and_tools_can_be_stopped(self):
         self.stop_all(("compare", "info", "mask-spectrum", "measure", "mesh-export", "render", "slice-export", "ssim", "stats", "write"))

@@ -1,0 +1,99 @@
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/profile/printer_profile.h"
+#include "ops/kernels/leaf/held_band.h"
+#include "ops/kernels/printing/detail_compensation.h"
+#include "ops/kernels/printing/gaussian_spread.h"
+#include "vdbdither/engine/operator.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/known_grids.h"
+
+namespace vdbdither {
+
+namespace {
+
+using openvdb::FloatGrid;
+using openvdb::Vec3d;
+
+/// `surface` moved where the printing process loses detail.
+class Compensate : public Filter {
+ public:
+  void declare(Options& options) override {
+    options.lengths(
+        "spread", spread_mm_, "LENGTH|X,Y,Z", {0, 1},
+        "Standard deviation of the Gaussian by which a droplet spreads; by default that "
+        "of the printer's profile, or else 50um");
+    options.integer("steps", steps_, {1, 2},
+                    "Steps: the second corrects what the first leaves or overdoes");
+  }
+
+  Schema plan(const Schema& in) override {
+    const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
+    if (!spread_mm_) spread_mm_ = usualSpreadMm(in);
+    if (spread_mm_->isZero())
+      throw UsageError("--spread: must be above 0 mm along an axis; leave the operator out");
+    const openvdb::Coord reach = GaussianSpread(in.lattice.pitch_mm, *spread_mm_).reach();
+    if (std::max({reach.x(), reach.y(), reach.z()}) > most_reach)
+      throw UsageError("--spread: the droplets would reach over more than " +
+                       std::to_string(most_reach) + " voxels; give a smaller spread");
+    checkBand(*surface, in.lattice);
+    compensation_ = DetailCompensation{in.lattice, *spread_mm_, steps_};
+    Schema out = withoutSurfaceExtras(in);
+    out.grids[surface_grid] = surface->copyGridWithNewTree();
+    return out;
+  }
+
+  [[nodiscard]] std::vector<Read> reads() const override {
+    return {{surface_grid, Reach::stencil(compensation_.reachLayers())}};
+  }
+
+  [[nodiscard]] std::optional<Work> work() const override {
+    return Work{.us_per_surface_leaf = cost::compensate_us};
+  }
+
+  [[nodiscard]] Grids run(const Slab& in) const override {
+    return {{surface_grid,
+             compensation_.run(*findGrid<FloatGrid>(in.grids, surface_grid), in.core, in.valid)}};
+  }
+
+ private:
+  static constexpr int most_reach = 100;
+
+  static Vec3d usualSpreadMm(const Schema& in) {
+    constexpr double usual_mm = 0.05;
+    const Vec3d stated = printerProfileOf(in).point_spread_mm;
+    return stated.isZero() ? Vec3d(usual_mm) : stated;
+  }
+
+  /// The dither takes what it needs from the background, which stays what it is; a feature is found
+  /// with a voxel diameter.
+  static void checkBand(const FloatGrid& surface, const Lattice& lattice) {
+    const double diagonal_mm = lattice.diagonalMm();
+    const double band_mm = double{surface.background()};
+    if (band_mm * (1 + 1e-6) >= diagonal_mm) return;
+    const auto text = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4); };
+    throw DataError("grid 'surface' holds distances up to " + text(band_mm) +
+                    " mm, and 'compensate' needs a voxel's diagonal, " + text(diagonal_mm) +
+                    " mm: mesh2sdf --band 1");
+  }
+
+  std::optional<Vec3d> spread_mm_;
+  int steps_ = 2;
+  DetailCompensation compensation_;
+};
+
+}  // namespace
+
+extern const OperatorInfo compensate;
+const OperatorInfo compensate{
+    "compensate", "The surface thickened and deepened where the printing process loses detail",
+    "mesh2sdf part.stl --printer mimaki-3duj-553 ! compensate ! dither ! slice-export out",
+    []() -> std::unique_ptr<Operator> { return std::make_unique<Compensate>(); }};
+
+}  // namespace vdbdither
