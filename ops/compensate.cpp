@@ -35,7 +35,7 @@ class Compensate : public Filter {
 
   Schema plan(const Schema& in) override {
     const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
-    if (!spread_mm_) spread_mm_ = usualSpreadMm(in);
+    if (!spread_mm_) spread_mm_ = pointSpreadMmOf(in);
     if (spread_mm_->isZero())
       throw UsageError("--spread: must be above 0 mm along an axis; leave the operator out");
     const openvdb::Coord reach = GaussianSpread(in.lattice.pitch_mm, *spread_mm_).reach();
@@ -64,12 +64,6 @@ class Compensate : public Filter {
 
  private:
   static constexpr int most_reach = 100;
-
-  static Vec3d usualSpreadMm(const Schema& in) {
-    constexpr double usual_mm = 0.05;
-    const Vec3d stated = printerProfileOf(in).point_spread_mm;
-    return stated.isZero() ? Vec3d(usual_mm) : stated;
-  }
 
   /// The dither takes what it needs from the background, which stays what it is; a feature is found
   /// with a voxel diameter.

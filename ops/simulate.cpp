@@ -45,6 +45,12 @@ class Simulate : public Filter {
     spread_.emplace(in.lattice.pitch_mm, *spread_mm_);
     checkReach(*spread_, 500, "--spread: the droplets would reach", "spread");
     Schema out = in;
+    // Distances have a margin around the part; the box of voxels alone can end at the part.
+    if (!in.grids.contains(surface_grid) && !box_.empty()) {
+      box_.min() -= spread_->reach();
+      box_.max() += spread_->reach();
+      out.lattice.box = box_;
+    }
     out.grids[printed_grid] = makePrintedGrid(solid->transform());
     if (translucency_mm_) {
       planColours(in);

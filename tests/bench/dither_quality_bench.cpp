@@ -16,7 +16,7 @@
 #include <utility>
 
 #include "io/vdb/vdb.h"
-#include "ops/kernels/dither/voxel_diameter.h"
+#include "ops/kernels/leaf/voxel_diameter.h"
 #include "tests/bench/dither_quality/methods.h"
 #include "tests/bench/dither_quality/parts.h"
 #include "tests/bench/dither_quality/print_measures.h"

@@ -47,6 +47,7 @@ RUNS = {
     "normals": lambda radius: ("normals", "-i", f"surface{radius}.vdb", "-o", "out.vdb"),
     "offset": lambda radius: (*surface(radius), "--band", "0.2mm", "!", "offset", "--by", "0.05mm", "-o", "out.vdb"),
     "read": lambda radius: ("read", f"surface{radius}.vdb", "-o", "out.vdb"),
+    "refine": lambda radius: (*surface(radius), "!", "dither", "!", "refine", "-o", "out.vdb"),
     "render": lambda radius: ("render", "part8.stl", "out.png", "--samples", 16 * radius),
     "resample": lambda radius: ("resample", f"surface{radius}.vdb", *MIMAKI, "-o", "out.vdb"),
     "separate": lambda radius: ("separate", "-i", f"coloured{radius}.vdb", "-o", "out.vdb"),
@@ -140,7 +141,7 @@ class Stopped(ProgramTest):
         self.stop_all(("mask", "mesh2sdf", "read", "resample", "slice-import"))
 
     def test_filters_can_be_stopped(self):
-        self.stop_all(("compensate", "csg", "dither", "halftone", "hollow", "interlace", "material-assign", "normals", "offset", "separate", "simulate"))
+        self.stop_all(("compensate", "csg", "dither", "halftone", "hollow", "interlace", "material-assign", "normals", "offset", "refine", "separate", "simulate"))
 
     def test_sinks_and_tools_can_be_stopped(self):
         self.stop_all(("compare", "info", "mask-spectrum", "measure", "mesh-export", "render", "slice-export", "ssim", "stats", "write"))

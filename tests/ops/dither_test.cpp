@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/tools/Prune.h>
 
+#include "io/profile/printer_profile.h"
 #include "io/vdb/vdb.h"
 #include "ops/kernels/mask/threshold_mask.h"
 #include "tests/support/dither_reference.h"
@@ -285,8 +286,11 @@ TEST(Dither, DiffusesByDefaultForTheBlurOfThePrinter) {
   const test::Voxels usual = solidBy({}, schema);
   EXPECT_EQ(usual, solidBy({"--method", "diffusion", "--spread", "50um"}, schema));
   EXPECT_GT(test::differences(usual, solidBy({"--spread", "25um"}, schema)), 10);
-  schema.metadata[printer_key] =
-      R"({"name": "p", "pitch_mm": [0.042, 0.084, 0.022], "point_spread_mm": [0.03, 0.04, 0.05]})";
+  PrinterProfile printer;
+  printer.name = "mine";
+  printer.pitch_mm = mimaki.pitch_mm;
+  printer.point_spread_mm = Vec3d(0.03, 0.04, 0.05);
+  schema.metadata["vdbdither:printer"] = toJson(printer);
   EXPECT_EQ(solidBy({}, schema), solidBy({"--spread", "0.03,0.04,0.05"}, schema));
 }
 

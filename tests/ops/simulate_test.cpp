@@ -70,6 +70,25 @@ TEST(Simulate, TheSpreadComesFromTheCommandLineThePrinterOrIsFiftyMicrometres) {
   EXPECT_EQ(reachOf({"--spread", "50um"}, in), usual);
 }
 
+TEST(Simulate, VoxelsThatTouchTheirBoxSpreadBeyondIt) {
+  const auto solid = BoolGrid::create(false);
+  const CoordBBox all(Coord(0), Coord(30, 14, 60));
+  solid->sparseFill(all, true);
+  solid->setTransform(transformOf({mimaki.pitch_mm, Vec3d(0.0), all}));
+  solid->setName("solid");
+  const Schema in = test::schemaOf({mimaki.pitch_mm, Vec3d(0.0), all}, {{"solid", solid}});
+  const auto simulate = test::filterCalled("simulate");
+  const CoordBBox grown = simulate->plan(in).lattice.box;
+  EXPECT_EQ(grown.min().z(), -10);
+  const ZRange layers{grown.min().z(), grown.max().z() + 1};
+  const auto printed = openvdb::gridConstPtrCast<FloatGrid>(
+      simulate->run({layers, layers, {{"solid", solid}}}).at("printed"));
+  const auto& tree = printed->tree();
+  EXPECT_GT(tree.getValue(Coord(15, 7, 62)), 0.01F);
+  EXPECT_EQ(tree.getValue(Coord(15, 7, 62)), tree.getValue(Coord(15, 7, -2)));
+  EXPECT_GT(tree.getValue(Coord(32, 7, 30)), 0.01F);
+}
+
 TEST(Simulate, RefusesWhatItCannotDo) {
   const auto plan = [](const std::vector<std::string>& arguments) {
     return [arguments] { test::filterCalled("simulate", arguments)->plan(block()); };

@@ -30,11 +30,12 @@ void diffuse(OpenLeaf& leaf, OpenSurroundings& around) {
     const openvdb::Coord ijk = leaf.leaf->offsetToGlobalCoord(offset);
     const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
     std::uint64_t& printed = leaf.printed[offset / 64];
-    if ((leaf.free[offset / 64] & bit) != 0) {
+    const bool free = bitAt(leaf.free, offset);
+    if (free) {
       const bool above = voxel->tone > 0.5F + around.sum(ijk, voxel->depth);
       printed = above ? printed | bit : printed & ~bit;
     }
-    voxel->error = ((printed & bit) != 0 ? 1.0F : 0.0F) - voxel->tone;
+    voxel->setPrinted((printed & bit) != 0, free);
     around.set(ijk, *voxel);
     ++voxel;
   });

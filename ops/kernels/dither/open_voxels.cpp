@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "ops/kernels/dither/tone_curve.h"
-#include "ops/kernels/dither/voxel_diameter.h"
 #include "ops/kernels/dither/voxel_normals.h"
 #include "ops/kernels/dither/wall_guard.h"
+#include "ops/kernels/leaf/voxel_diameter.h"
 
 namespace vdbdither {
 

@@ -15,11 +15,20 @@
 
 namespace vdbdither {
 
+/// The bit of the voxel at `offset`.
+inline bool bitAt(const LeafBits& bits, unsigned offset) {
+  return (bits[offset / 64] >> (offset % 64) & 1) != 0;
+}
+
 /// A voxel that can be printed or not: |d| < k_D.
 struct OpenVoxel {
   float depth;  ///< d/σ, with the blur σ along the normal of the facet
   float tone;   ///< the share that is to be printed of voxels like this one
-  float error;  ///< printed or not, 1 or 0, minus the tone, once this is decided
+  float error;  ///< printed or not, 1 or 0, minus the tone, once this is decided; 0 if held
+
+  /// Sets the error. A voxel that the guard holds passes none on: at an edge of the part, its
+  /// neighbours on flat faces would make up for it with bumps.
+  void setPrinted(bool printed, bool free) { error = free ? (printed ? 1.0F : 0.0F) - tone : 0.0F; }
 };
 
 /// The open voxels of a leaf, in the order of the leaf.

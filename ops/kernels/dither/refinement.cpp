@@ -72,10 +72,9 @@ class RefinedBlock {
       forEachBit(leaf->open, [&](unsigned offset) {
         const Coord ijk = leaf->leaf->offsetToGlobalCoord(offset);
         const Coord at = ijk - corner;
-        const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
         numbers_[indexOf(at)] = static_cast<std::int16_t>(voxels_.size());
-        voxels_.push_back({at, (leaf->free[offset / 64] & bit) != 0,
-                           (leaf->printed[offset / 64] & bit) != 0, open->error});
+        voxels_.push_back(
+            {at, bitAt(leaf->free, offset), bitAt(leaf->printed, offset), open->error});
         places_.x.push_back(static_cast<float>(at.x() * step_.x()));
         places_.y.push_back(static_cast<float>(at.y() * step_.y()));
         places_.z.push_back(static_cast<float>(at.z() * step_.z()));
@@ -190,8 +189,7 @@ void begin(OpenLeaf& leaf, openvdb::tree::ValueAccessor<const openvdb::BoolTree,
   leaf.printed = printed;
   OpenVoxel* open = leaf.voxels.data();
   forEachBit(leaf.open, [&](unsigned offset) {
-    const bool is_printed = (printed[offset / 64] >> (offset % 64) & 1) != 0;
-    open->error = (is_printed ? 1.0F : 0.0F) - open->tone;
+    open->setPrinted(bitAt(printed, offset), bitAt(leaf.free, offset));
     ++open;
   });
   leaf.decided = true;
@@ -206,15 +204,17 @@ Refinement::Refinement(const Vec3d& pitch_mm, const Vec3d& spread_mm, bool guard
       order_(kernel_.reach()) {}
 
 int Refinement::reachLayers() const {
-  return order_.reachLayers(sweeps_) + OpenLeaves::reachLayers(settings_.guarded);
+  return order_.reachLayers(sweeps_) + order_.edges().z() +
+         OpenLeaves::reachLayers(settings_.guarded);
 }
 
 openvdb::BoolGrid::Ptr Refinement::run(const openvdb::FloatGrid& surface,
                                        const openvdb::Vec3SGrid* normals,
                                        const openvdb::BoolGrid& solid, ZRange core,
                                        ZRange valid) const {
-  OpenLeaves leaves(surface, normals, settings_, order_,
-                    intersection(order_.needed(core, sweeps_), valid), valid);
+  // The first sweep also reads, but does not change, the layers of blocks beside the outermost.
+  const ZRange held = grownWithin(order_.needed(core, sweeps_), order_.edges().z(), valid);
+  OpenLeaves leaves(surface, normals, settings_, order_, held, valid);
   leaves.visitAtOnce([&](OpenLeaf& leaf) {
     openvdb::tree::ValueAccessor<const openvdb::BoolTree, false> printed(solid.tree());
     begin(leaf, printed);

@@ -12,11 +12,11 @@
 
 #include "ops/kernels/distance/closest_surface_voxel.h"
 #include "ops/kernels/distance/gradient.h"
-#include "ops/kernels/dither/voxel_diameter.h"
 #include "ops/kernels/dither/voxel_normals.h"
 #include "ops/kernels/dither/wall_guard.h"
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
+#include "ops/kernels/leaf/voxel_diameter.h"
 #include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {

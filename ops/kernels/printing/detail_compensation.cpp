@@ -23,6 +23,7 @@
 #include "ops/kernels/leaf/simple_point.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/surface_leaves.h"
+#include "ops/kernels/leaf/voxel_diameter.h"
 #include "ops/kernels/printing/blur_quantile.h"
 #include "ops/kernels/printing/gaussian_spread.h"
 #include "ops/kernels/printing/half_space_share.h"
@@ -85,13 +86,6 @@ struct DetailLeaf {
   std::vector<Detail> details;
   std::vector<Neighbour> neighbours;
 };
-
-double halfDiameter(const Vec3d& normal, const Vec3d& pitch_mm) {
-  double steepest = 0;
-  for (int axis = 0; axis < 3; ++axis)
-    steepest = std::max(steepest, std::abs(normal[axis]) / pitch_mm[axis]);
-  return 0.5 / steepest;
-}
 
 /// The unit gradient at a place of a window of distances, of which only those below the background
 /// are known; zero where the gradient is too short.
@@ -192,7 +186,7 @@ class Run {
   }
   [[nodiscard]] Detail detailOf(unsigned offset, const Coord& local, float d_mm,
                                 const Vec3d& normal) const {
-    const auto half = static_cast<float>(halfDiameter(normal, pitch_mm_));
+    const auto half = static_cast<float>(halfVoxelDiameter(normal, pitch_mm_));
     const Vec3d foot = local.asVec3d() - normal * double{d_mm} / pitch_mm_;
     return {offset, d_mm, Vec3s(normal), half, Vec3s(foot)};
   }
@@ -222,7 +216,8 @@ class Run {
     forEachBit(activeBits(leaf, rowWithin(leaf.origin().z(), layers)), [&](unsigned offset) {
       const float* d = at(near, offset);
       const Vec3d normal = unitGradient(d, stridesOf(near), background_, pitch_mm_);
-      if (normal.isZero() || std::abs(double{*d}) >= zero_from * halfDiameter(normal, pitch_mm_))
+      if (normal.isZero() ||
+          std::abs(double{*d}) >= zero_from * halfVoxelDiameter(normal, pitch_mm_))
         return;
       found.details.push_back(detailOf(offset, FloatLeaf::offsetToLocalCoord(offset), *d, normal));
     });
@@ -491,10 +486,11 @@ class Run {
     if (nearest == background_) return;
     const float* d = distances.at(of.x(), of.y(), of.z());
     const Vec3d normal = unitGradient(d, stridesOf(distances), background_, pitch_mm_);
+    if (normal.isZero()) return;
     const double flat_mm = double{*d} + normal.dot((local - of).asVec3d() * pitch_mm_);
     // The band holds a diameter.
     const double depth_mm =
-        std::max(inside ? -flat_mm : flat_mm, 2 * halfDiameter(normal, pitch_mm_));
+        std::max(inside ? -flat_mm : flat_mm, 2 * halfVoxelDiameter(normal, pitch_mm_));
     if (depth_mm >= double{background_}) return;
     const auto d_mm = static_cast<float>(inside ? -depth_mm : depth_mm);
     leaf.neighbours.push_back({offset, detailOf(offset, local, d_mm, normal), leaf.origin + of});

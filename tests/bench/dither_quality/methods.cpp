@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "ops/kernels/dither/voxel_diameter.h"
+#include "ops/kernels/leaf/voxel_diameter.h"
 #include "vdbdither/engine/options.h"
 
 namespace vdbdither::quality {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include "ops/kernels/dither/voxel_diameter.h"
+#include "ops/kernels/leaf/voxel_diameter.h"
 
 namespace vdbdither::quality {
 

@@ -1,4 +1,4 @@
-#include "ops/kernels/dither/voxel_diameter.h"
+#include "ops/kernels/leaf/voxel_diameter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,7 +26,7 @@ TEST(HalfVoxelDiameter, IsTheDistanceToTheBoundaryAlongTheNormal) {
       ASSERT_LE(halfVoxelDiameter(along, pitch_mm), pitch_mm.length() / 2 * (1 + 1e-7));
     }
     EXPECT_EQ(halfVoxelDiameter(openvdb::Vec3s(0.0F), pitch_mm), 0);
-    EXPECT_DOUBLE_EQ(halfVoxelDiameter({0, 0, -1}, pitch_mm), pitch_mm.z() / 2);
+    EXPECT_DOUBLE_EQ(halfVoxelDiameter(openvdb::Vec3s(0, 0, -1), pitch_mm), pitch_mm.z() / 2);
   }
 }
 
