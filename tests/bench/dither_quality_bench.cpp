@@ -295,7 +295,7 @@ void printStrokes(const Detail& piece, const Voxels& printed) {
 
 void detail(const Masks& masks, const Choice& choice) {
   std::vector<Method> methods = methodsFor(masks, false);
-  methods.push_back(dithered("best unguarded", masks.ours, 2, DitherAt::voxel, true, false));
+  methods.push_back(diffused("best unguarded", false));
   methods.push_back(dithered("2 voxel", masks.ours, 2, DitherAt::voxel));
   methods.push_back(coverage(masks.ours));
   methods = chosen(std::move(methods), choice.method);

@@ -90,7 +90,7 @@ class Halftones(ProgramTest):
             density = pyopenvdb.FloatGrid()
             density.name = "density"
             density.transform = pyopenvdb.createLinearTransform(0.05)
-            density.fill((0, 0, 0), (9, 9, 9), value)
+            density.fill((0, 0, 0), (7, 7, 7), value)
             pyopenvdb.write(str(self.folder / "field.vdb"), [density] + list(pyopenvdb.readAll(str(self.folder / "solid.vdb"))[0]))
             self.refuse(1, message, "halftone", "field.vdb", "--inks", "white,black",
                         "--coverages", "density=black", *SMALL_MASK, "!", "slice-export", "out")

@@ -43,7 +43,7 @@ class History(ProgramTest):
                          "part.stl --printer mimaki-3duj-553 --unit mm --scale 1 --rotate 0,0,0 --refine-y 1 --band 1 --colour-depth 1mm --overlap first")
         self.assertEqual(self.arguments("x.vdb", "normals"), "")
         self.assertEqual(self.arguments("x.vdb", "dither"),
-                         "--preset best --method diffusion --guard walls --spread 0.05mm,0.05mm,0.05mm")
+                         "--preset best --method diffusion --guard walls --spread 0.05mm,0.05mm,0.05mm --refine 0")
         self.assertEqual(self.arguments("x.vdb", "material-assign"), "--material white")
         self.assertEqual(self.arguments("x.vdb", "simulate"), "--spread 0.05mm,0.05mm,0.05mm --translucency none")
         self.assert_runs_again("x.vdb")

@@ -57,7 +57,7 @@ class Masks(ProgramTest):
         self.assertEqual(self.kept(), [])
 
     def test_the_installed_mask_is_the_one_that_would_be_made(self):
-        self.dithered("-o", "installed.vdb")
+        self.dithered("--mask", "blue", "-o", "installed.vdb")
         self.dithered("--size", 64, "-o", "made.vdb")
         self.assertEqual(len(self.kept()), 1)
         self.succeed("compare", "installed.vdb", "made.vdb")

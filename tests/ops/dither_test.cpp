@@ -332,7 +332,7 @@ TEST(Dither, PresetsAreWhatTheirOptionsSay) {
                                   "--guard", "walls"}));
   EXPECT_EQ(solidBy({"--preset", "paper"}),
             solidBy({"--amplitude", "4", "--at", "closest", "--guard", "none"}));
-  EXPECT_GT(test::differences(solidBy({}), solidBy({"--preset", "paper"})), 1000);
+  EXPECT_GT(test::differences(solidBy({}), solidBy({"--preset", "paper"})), 500);
 }
 
 }  // namespace

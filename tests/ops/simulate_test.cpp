@@ -79,7 +79,7 @@ TEST(Simulate, VoxelsThatTouchTheirBoxSpreadBeyondIt) {
   const Schema in = test::schemaOf({mimaki.pitch_mm, Vec3d(0.0), all}, {{"solid", solid}});
   const auto simulate = test::filterCalled("simulate");
   const CoordBBox grown = simulate->plan(in).lattice.box;
-  EXPECT_EQ(grown.min().z(), -10);
+  EXPECT_EQ(grown.min().z(), -simulate->reads().at(0).reach.above);
   const ZRange layers{grown.min().z(), grown.max().z() + 1};
   const auto printed = openvdb::gridConstPtrCast<FloatGrid>(
       simulate->run({layers, layers, {{"solid", solid}}}).at("printed"));

@@ -18,10 +18,10 @@ constexpr double reach_in_spreads = 3.3;
 
 /// Only the voxels decided before count, on one side of each; the errors of those that follow are
 /// open. A factor above one makes up for them.
-constexpr double feedback = 1.2;
+constexpr double feedback = 1.15;
 
 /// Slightly wider hills than those of σ serve a process that is blunter than stated, too.
-constexpr double width = 1.1;
+constexpr double width = 1.15;
 
 /// Decides the voxels of a leaf in the order of the leaf.
 void diffuse(OpenLeaf& leaf, OpenSurroundings& around) {
