@@ -20,11 +20,11 @@ class OpenVoxelFinder {
  public:
   OpenVoxelFinder(const openvdb::FloatGrid& surface, const openvdb::Vec3SGrid* normals,
                   const OpenLeaves::Settings& settings, const ToneCurve& tone, ZRange valid)
-      : settings_(settings),
+      : normals_(surface.tree(), settings.pitch_mm, normals ? &normals->tree() : nullptr, valid),
+        settings_(settings),
         tone_(tone),
-        valid_(valid),
-        normals_(surface.tree(), settings.pitch_mm, normals ? &normals->tree() : nullptr, valid),
-        guard_(surface.tree(), settings.pitch_mm, surface.background(), valid) {}
+        guard_(surface.tree(), settings.pitch_mm, surface.background(), valid),
+        valid_(valid) {}
 
   void operator()(OpenLeaf& open) {
     const FloatLeaf& leaf = *open.leaf;
@@ -57,11 +57,11 @@ class OpenVoxelFinder {
       open.free[offset / 64] |= bit;
   }
 
+  VoxelNormals normals_;
   const OpenLeaves::Settings& settings_;
   const ToneCurve& tone_;
-  ZRange valid_;
-  VoxelNormals normals_;
   WallGuard guard_;
+  ZRange valid_;
 };
 
 }  // namespace

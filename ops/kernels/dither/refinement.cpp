@@ -122,8 +122,7 @@ class RefinedBlock {
     voxel.printed = change > 0;
     voxel.error += change;
     for (std::size_t m = 0; m < places_.sum.size(); m += 4) {
-      Floats sums = loadFloats(&places_.sum[m]) + change * weights(n, m);
-      std::copy_n(&sums[0], 4, &places_.sum[m]);
+      storeFloats(&places_.sum[m], loadFloats(&places_.sum[m]) + change * weights(n, m));
     }
   }
 

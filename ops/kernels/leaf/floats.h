@@ -21,6 +21,9 @@ inline Floats loadFloats(const float* from) {
   return values;
 }
 
+/// Writes them from `to` on.
+inline void storeFloats(float* to, Floats values) { std::memcpy(to, &values, sizeof values); }
+
 /// The lesser of each two; of values that are neither NaN nor zeros of different signs.
 inline Floats lesserOf(Floats a, Floats b) {
 #ifdef __SSE2__
