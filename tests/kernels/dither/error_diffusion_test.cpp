@@ -80,7 +80,8 @@ void compareWithReference(const Vec3d& pitch_mm, const Vec3d& spread_mm,
           const double apart2 = (Vec3d(x, y, z) * pitch_mm / spread_mm).lengthSqr();
           if (apart2 > 3.3 * 3.3) continue;
           const double deeper = voxel.depth - other->second.depth;
-          const double w = std::pow(1 - std::max(apart2 - deeper * deeper, 0.0) / (32 * 1.15 * 1.15), 8);
+          const double w =
+              std::pow(1 - std::max(apart2 - deeper * deeper, 0.0) / (32 * 1.15 * 1.15), 8);
           sum += 1.15 * w * ((other->second.printed ? 1 : 0) - other->second.tone);
         }
       }
