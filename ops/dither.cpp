@@ -61,8 +61,7 @@ constexpr std::array<Choice<Preset>, 2> presets{
       "blue --amplitude 2 --at voxel"},
      {Preset::paper, "paper",
       "Shape dithering of Morsy et al. (2022): --method mask --mask paper --amplitude 4 --at "
-      "closest "
-      "--guard none"}}};
+      "closest --guard none"}}};
 
 ThresholdMask readMask(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path)) {

@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/colour/empty_colours.h"
+#include "ops/kernels/leaf/floor_divided.h"
 #include "ops/kernels/leaf/leaf_origins.h"
 #include "ops/kernels/leaf/node_writer.h"
 
@@ -27,8 +28,6 @@ using FloatLeaf = openvdb::FloatTree::LeafNodeType;
 using Vec3SLeaf = openvdb::Vec3STree::LeafNodeType;
 
 constexpr int edge = leaf_layers;
-
-int floorDivided(int a, int b) { return a / b - (a % b < 0 ? 1 : 0); }
 
 /// Layers of the lattice grouped in odd numbers: group K has its middle in layer `size` · K.
 struct LayerGroups {

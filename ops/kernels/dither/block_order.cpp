@@ -2,14 +2,9 @@
 
 #include <algorithm>
 
+#include "ops/kernels/leaf/floor_divided.h"
+
 namespace vdbdither {
-
-namespace {
-
-/// The floor of a / b.
-int floorOfQuotient(int a, int b) { return a / b - static_cast<int>(a % b < 0); }
-
-}  // namespace
 
 BlockOrder::BlockOrder(const openvdb::Coord& reach) {
   const openvdb::Coord minimum(2, 2, 1);
@@ -19,14 +14,19 @@ BlockOrder::BlockOrder(const openvdb::Coord& reach) {
 }
 
 openvdb::Coord BlockOrder::blockOf(const openvdb::Coord& ijk) const {
-  return {floorOfQuotient(ijk.x(), edges_.x()), floorOfQuotient(ijk.y(), edges_.y()),
-          floorOfQuotient(ijk.z(), edges_.z())};
+  return {floorDivided(ijk.x(), edges_.x()), floorDivided(ijk.y(), edges_.y()),
+          floorDivided(ijk.z(), edges_.z())};
+}
+
+openvdb::Coord BlockOrder::cornerOf(const openvdb::Coord& ijk) const {
+  const openvdb::Coord block = blockOf(ijk);
+  return {block.x() * edges_.x(), block.y() * edges_.y(), block.z() * edges_.z()};
 }
 
 ZRange BlockOrder::needed(ZRange core, int sweeps) const {
   if (core.empty()) return core;
-  int first = floorOfQuotient(core.begin, edges_.z());
-  int last = floorOfQuotient(core.end - 1, edges_.z());
+  int first = floorDivided(core.begin, edges_.z());
+  int last = floorDivided(core.end - 1, edges_.z());
   // An odd layer needs the even ones beside it; in the sweeps before, they need their neighbours.
   first -= first & 1;
   last += last & 1;

@@ -27,6 +27,9 @@ class BlockOrder {
   /// The index of the block that holds this voxel.
   [[nodiscard]] openvdb::Coord blockOf(const openvdb::Coord& ijk) const;
 
+  /// The lowest voxel of the block that holds this voxel.
+  [[nodiscard]] openvdb::Coord cornerOf(const openvdb::Coord& ijk) const;
+
   /// 0 … 7, in the order of visits.
   static int colourOf(const openvdb::Coord& block) {
     return ((block.z() & 1) << 2) | ((block.y() & 1) << 1) | (block.x() & 1);

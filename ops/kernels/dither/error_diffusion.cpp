@@ -1,7 +1,7 @@
 // Error diffusion goes back to Floyd and Steinberg: An Adaptive Algorithm for Spatial Greyscale,
-// Proceedings of the Society for Information Display 17(2), 1976; a parallel order in blocks to
-// Zhang et al. and others for images. The error is weighed as direct binary search weighs it:
-// Analoui, Allebach: Model-based halftoning using direct binary search, SPIE 1666, 1992.
+// Proceedings of the Society for Information Display 17(2), 1976. The error is weighed as direct
+// binary search weighs it: Analoui, Allebach: Model-based halftoning using direct binary search,
+// SPIE 1666, 1992.
 
 #include "ops/kernels/dither/error_diffusion.h"
 
@@ -25,19 +25,12 @@ constexpr double width = 1.15;
 
 /// Decides the voxels of a leaf in the order of the leaf.
 void diffuse(OpenLeaf& leaf, OpenSurroundings& around) {
-  OpenVoxel* voxel = leaf.voxels.data();
-  forEachBit(leaf.open, [&](unsigned offset) {
+  leaf.forEachOpen([&](unsigned offset, OpenVoxel& voxel) {
     const openvdb::Coord ijk = leaf.leaf->offsetToGlobalCoord(offset);
-    const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
-    std::uint64_t& printed = leaf.printed[offset / 64];
     const bool free = bitAt(leaf.free, offset);
-    if (free) {
-      const bool above = voxel->tone > 0.5F + around.sum(ijk, voxel->depth);
-      printed = above ? printed | bit : printed & ~bit;
-    }
-    voxel->setPrinted((printed & bit) != 0, free);
-    around.set(ijk, *voxel);
-    ++voxel;
+    if (free) setBit(leaf.printed, offset, voxel.tone > 0.5F + around.sum(ijk, voxel.depth));
+    voxel.setPrinted(bitAt(leaf.printed, offset), free);
+    around.set(ijk, voxel);
   });
   leaf.decided = true;
 }

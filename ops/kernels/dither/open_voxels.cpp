@@ -50,11 +50,10 @@ class OpenVoxelFinder {
     const double spread_mm = (openvdb::Vec3d(normal) * settings_.spread_mm).length();
     open.voxels.push_back(
         {static_cast<float>(double{d} / spread_mm), tone_(d, half_diameter_mm, spread_mm), 0.0F});
-    const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
-    open.open[offset / 64] |= bit;
-    if (!settings_.guarded ||
-        guard_.allows(normals_.around(), open.leaf->origin(), offset, normal, d))
-      open.free[offset / 64] |= bit;
+    setBit(open.open, offset, true);
+    setBit(open.free, offset,
+           !settings_.guarded ||
+               guard_.allows(normals_.around(), open.leaf->origin(), offset, normal, d));
   }
 
   VoxelNormals normals_;
@@ -73,7 +72,7 @@ OpenLeaves::OpenLeaves(const openvdb::FloatGrid& surface, const openvdb::Vec3SGr
                        ZRange valid) {
   for (const FloatLeaf* leaf : leavesIn(surface.tree(), layers))
     leaves_.push_back({leaf, {}, {}, {}, false, {}});
-  this->order(order);
+  sortIntoBlocks(order);
 
   const ToneCurve tone;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves_.size()), [&](const auto& range) {
@@ -82,7 +81,7 @@ OpenLeaves::OpenLeaves(const openvdb::FloatGrid& surface, const openvdb::Vec3SGr
   });
 }
 
-void OpenLeaves::order(const BlockOrder& order) {
+void OpenLeaves::sortIntoBlocks(const BlockOrder& order) {
   struct Ranked {
     std::array<int, 4> rank;  // the layer of blocks, the colour, the block
     std::uint32_t leaf;
@@ -142,9 +141,7 @@ void OpenSurroundings::visit(const OpenLeaf& leaf, OpenLeaves::Finder& leaves) {
     if (present_[column] != 0) std::fill_n(&errors_[column * stride_], stride_, 0.0F);
     present_[column] = 0;
   }
-  const Coord block = order_.blockOf(leaf.leaf->origin());
-  for (int axis = 0; axis < 3; ++axis)
-    lowest_[axis] = block[axis] * order_.edges()[axis] - reach_[axis];
+  lowest_ = order_.cornerOf(leaf.leaf->origin()) - reach_;
   const Coord first = lowest_ & ~(leaf_layers - 1);
   for (int x = first.x(); x < lowest_.x() + edges_.x(); x += leaf_layers) {
     for (int y = first.y(); y < lowest_.y() + edges_.y(); y += leaf_layers) {

@@ -20,6 +20,13 @@ inline bool bitAt(const LeafBits& bits, unsigned offset) {
   return (bits[offset / 64] >> (offset % 64) & 1) != 0;
 }
 
+/// Sets it.
+inline void setBit(LeafBits& bits, unsigned offset, bool value) {
+  const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
+  std::uint64_t& word = bits[offset / 64];
+  word = value ? word | bit : word & ~bit;
+}
+
 /// A voxel that can be printed or not: |d| < k_D.
 struct OpenVoxel {
   float depth;  ///< d/σ, with the blur σ along the normal of the facet
@@ -39,6 +46,13 @@ struct OpenLeaf {
   LeafBits printed{};  ///< all voxels; those of the plain voxelization until they are decided
   bool decided = false;
   std::vector<OpenVoxel> voxels;
+
+  /// Calls `visit(offset, voxel)` for every open voxel, in the order of the leaf.
+  template <typename Visit>
+  void forEachOpen(Visit visit) {
+    OpenVoxel* voxel = voxels.data();
+    forEachBit(open, [&](unsigned offset) { visit(offset, *voxel++); });
+  }
 };
 
 /// The open voxels of a range of layers.
@@ -115,16 +129,17 @@ class OpenLeaves {
  private:
   static constexpr openvdb::Index leaf_shift = FloatLeaf::LOG2DIM;
 
-  std::vector<OpenLeaf> leaves_;      ///< in the order of the tree
-  std::vector<OpenLeaf*> in_blocks_;  ///< the same by blocks
-  openvdb::Int32Tree numbers_{-1};  ///< indices of `leaves_`, by the indices of the leaves in space
-  void order(const BlockOrder& order);
-
   using Blocks = std::vector<Block>;
   struct Layer {
     int bottom;                                          ///< its lowest layer of voxels
     std::array<Blocks, BlockOrder::colours / 2> blocks;  ///< by the colours of its parity
   };
+
+  void sortIntoBlocks(const BlockOrder& order);
+
+  std::vector<OpenLeaf> leaves_;      ///< in the order of the tree
+  std::vector<OpenLeaf*> in_blocks_;  ///< the same by blocks
+  openvdb::Int32Tree numbers_{-1};  ///< indices of `leaves_`, by the indices of the leaves in space
   std::array<std::vector<Layer>, 2> layers_;  ///< by parity
 };
 

@@ -7,6 +7,7 @@
 #include <array>
 
 #include "ops/kernels/leaf/solid.h"
+#include "ops/kernels/leaf/true_bits.h"
 
 namespace vdbdither {
 
@@ -28,6 +29,7 @@ class RefinedBlock {
   RefinedBlock(const OpenLeaves::Settings& settings, const HeightKernel& kernel,
                const BlockOrder& order)
       : kernel_(kernel),
+        order_(order),
         step_(settings.pitch_mm / settings.spread_mm),
         edges_(order.edges()),
         numbers_(static_cast<std::size_t>(edges_.x() * edges_.y() * edges_.z())),
@@ -35,8 +37,8 @@ class RefinedBlock {
     for (const HeightKernel::Hill& hill : kernel.hills()) own_weight_ += hill.factor;
   }
 
-  void refine(OpenLeaves::Block leaves, const BlockOrder& order, OpenLeaves::Finder& find) {
-    gather(leaves, order, find);
+  void refine(OpenLeaves::Block leaves, OpenLeaves::Finder& find) {
+    gather(leaves, find);
     for (std::size_t n = 0; n < voxels_.size(); ++n) improve(n);
     writeBack(leaves);
   }
@@ -49,7 +51,7 @@ class RefinedBlock {
     float error;
   };
 
-  /// The four values of each voxel that `change` reads, in arrays of their own.
+  /// What `apply` reads and changes of each voxel, in arrays of their own.
   struct Places {
     std::vector<float> x, y, z, depth, sum;
     void clear() {
@@ -60,27 +62,24 @@ class RefinedBlock {
     }
   };
 
-  void gather(OpenLeaves::Block leaves, const BlockOrder& order, OpenLeaves::Finder& find) {
+  void gather(OpenLeaves::Block leaves, OpenLeaves::Finder& find) {
     voxels_.clear();
     places_.clear();
     std::fill(numbers_.begin(), numbers_.end(), none);
     around_.visit(*leaves.front(), find);
-    const Coord block = order.blockOf(leaves.front()->leaf->origin());
-    const Coord corner(block.x() * edges_.x(), block.y() * edges_.y(), block.z() * edges_.z());
-    for (const OpenLeaf* leaf : leaves) {
-      const OpenVoxel* open = leaf->voxels.data();
-      forEachBit(leaf->open, [&](unsigned offset) {
+    const Coord corner = order_.cornerOf(leaves.front()->leaf->origin());
+    for (OpenLeaf* leaf : leaves) {
+      leaf->forEachOpen([&](unsigned offset, const OpenVoxel& open) {
         const Coord ijk = leaf->leaf->offsetToGlobalCoord(offset);
         const Coord at = ijk - corner;
         numbers_[indexOf(at)] = static_cast<std::int16_t>(voxels_.size());
         voxels_.push_back(
-            {at, bitAt(leaf->free, offset), bitAt(leaf->printed, offset), open->error});
+            {at, bitAt(leaf->free, offset), bitAt(leaf->printed, offset), open.error});
         places_.x.push_back(static_cast<float>(at.x() * step_.x()));
         places_.y.push_back(static_cast<float>(at.y() * step_.y()));
         places_.z.push_back(static_cast<float>(at.z() * step_.z()));
-        places_.depth.push_back(open->depth);
-        places_.sum.push_back(around_.sum(ijk, open->depth));
-        ++open;
+        places_.depth.push_back(open.depth);
+        places_.sum.push_back(around_.sum(ijk, open.depth));
       });
     }
     places_.pad();
@@ -121,9 +120,8 @@ class RefinedBlock {
     Voxel& voxel = voxels_[n];
     voxel.printed = change > 0;
     voxel.error += change;
-    for (std::size_t m = 0; m < places_.sum.size(); m += 4) {
+    for (std::size_t m = 0; m < places_.sum.size(); m += 4)
       storeFloats(&places_.sum[m], loadFloats(&places_.sum[m]) + change * weights(n, m));
-    }
   }
 
   [[nodiscard]] float weight(std::size_t n, std::size_t m) const {
@@ -145,13 +143,9 @@ class RefinedBlock {
   void writeBack(OpenLeaves::Block leaves) {
     const Voxel* voxel = voxels_.data();
     for (OpenLeaf* leaf : leaves) {
-      OpenVoxel* open = leaf->voxels.data();
-      forEachBit(leaf->open, [&](unsigned offset) {
-        const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
-        std::uint64_t& printed = leaf->printed[offset / 64];
-        printed = voxel->printed ? printed | bit : printed & ~bit;
-        open->error = voxel->error;
-        ++open;
+      leaf->forEachOpen([&](unsigned offset, OpenVoxel& open) {
+        setBit(leaf->printed, offset, voxel->printed);
+        open.error = voxel->error;
         ++voxel;
       });
     }
@@ -166,6 +160,7 @@ class RefinedBlock {
   static constexpr float least_gain = 1e-3F;
 
   const HeightKernel& kernel_;
+  const BlockOrder& order_;
   openvdb::Vec3f step_;  ///< the pitch in σ
   Coord edges_;
   float own_weight_ = 0;
@@ -178,18 +173,13 @@ class RefinedBlock {
 /// Takes over which voxels of `solid` are printed.
 void begin(OpenLeaf& leaf, openvdb::tree::ValueAccessor<const openvdb::BoolTree, false>& solid) {
   const Coord origin = leaf.leaf->origin();
-  LeafBits printed{};
   if (const auto* there = solid.probeConstLeaf(origin)) {
-    for (unsigned offset = 0; offset < 512; ++offset)
-      printed[offset / 64] |= std::uint64_t{there->getValue(offset)} << (offset % 64);
-  } else if (solid.getValue(origin)) {
-    printed.fill(~std::uint64_t{0});
+    leaf.printed = trueBits(*there);
+  } else {
+    leaf.printed.fill(solid.getValue(origin) ? ~std::uint64_t{0} : 0);
   }
-  leaf.printed = printed;
-  OpenVoxel* open = leaf.voxels.data();
-  forEachBit(leaf.open, [&](unsigned offset) {
-    open->setPrinted(bitAt(printed, offset), bitAt(leaf.free, offset));
-    ++open;
+  leaf.forEachOpen([&](unsigned offset, OpenVoxel& open) {
+    open.setPrinted(bitAt(leaf.printed, offset), bitAt(leaf.free, offset));
   });
   leaf.decided = true;
 }
@@ -220,9 +210,9 @@ openvdb::BoolGrid::Ptr Refinement::run(const openvdb::FloatGrid& surface,
   });
   for (int sweep = 0; sweep < sweeps_; ++sweep) {
     leaves.visitInOrder(order_.needed(core, sweeps_ - sweep), [&] {
-      return [this, find = OpenLeaves::Finder(leaves),
+      return [find = OpenLeaves::Finder(leaves),
               refined = RefinedBlock(settings_, kernel_, order_)](OpenLeaves::Block block) mutable {
-        refined.refine(block, order_, find);
+        refined.refine(block, find);
       };
     });
   }

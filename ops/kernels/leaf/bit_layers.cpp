@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "ops/kernels/leaf/leaf_bits.h"
+#include "ops/kernels/leaf/true_bits.h"
 
 namespace vdbdither {
 
@@ -22,12 +23,7 @@ struct TrueVoxels {
   using Tree = openvdb::BoolTree;
 
   [[nodiscard]] static bool tile(bool value, bool active) { return value && active; }
-  [[nodiscard]] static LeafBits leaf(const Tree::LeafNodeType& leaf) {
-    LeafBits bits;
-    for (unsigned x = 0; x < bits.size(); ++x)
-      bits[x] = leaf.getValueMask().getWord<std::uint64_t>(x) & leaf.buffer().data()[x];
-    return bits;
-  }
+  [[nodiscard]] static LeafBits leaf(const Tree::LeafNodeType& leaf) { return trueBits(leaf); }
 };
 
 struct ScalarVoxels {
