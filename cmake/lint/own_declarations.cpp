@@ -18,7 +18,7 @@ class OwnDeclarations : public clang::ASTConsumer {
   void HandleTranslationUnit(clang::ASTContext& context) override {
     const clang::SourceManager& sources = context.getSourceManager();
     std::vector<clang::Decl*> own;
-    for (clang::Decl* declaration : context.getTranslationUnitDecl()->decls()) {
+    for (clang::Decl* declaration : context.getTranslationUnitDecl()->noload_decls()) {
       const clang::SourceLocation location = declaration->getLocation();
       if (location.isValid() && !sources.isInSystemHeader(sources.getExpansionLoc(location)))
         own.push_back(declaration);
