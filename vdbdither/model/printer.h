@@ -21,6 +21,9 @@ struct Material {
   /// printer share.
   std::optional<openvdb::Vec3d> absorption = std::nullopt;
   std::optional<openvdb::Vec3d> scattering = std::nullopt;
+  std::optional<double> density_g_per_cm3 = std::nullopt;  ///< of the solid, > 0
+  /// What containers of slices call it, such as VeroCY-V; empty where that is its name.
+  std::string resin = {};
 };
 
 /// How the surface of a print mirrors light, 0 … 1 (Saunderson 1942).
@@ -37,6 +40,20 @@ struct PrinterProfile {
   /// Voxel size across the carriage (x), along it (y), and the layer (z).
   openvdb::Vec3d pitch_mm{0.0};
   openvdb::Vec3d build_mm{0.0};  ///< usable volume; zero where unknown
+  /// How it makes a layer: "jetting" lays droplets, "resin" cures a vat by light, so that parts of
+  /// a slice without anything below are lost; empty where unknown.
+  std::string technology;
+  std::optional<openvdb::Vec2d> layer_mm;  ///< lowest and highest layers it takes; pitch_mm[2] is
+                                           ///< one of them; nothing where only that is known
+  openvdb::Vec2i slice_px{0, 0};  ///< columns and rows of the display or tray; zero where unknown
+  /// Where x = y = 0 of the part lies on the display or tray: "corner" or "centre".
+  std::string origin = "corner";
+  bool mirror_x = false;                ///< it takes slices mirrored, left to right
+  bool mirror_y = false;                ///< it takes slices mirrored, top to bottom
+  int minimum_slices = 0;               ///< of a job; zero where unknown
+  int maximum_colours = 0;              ///< of a job, besides the background; zero where unknown
+  std::vector<std::string> containers;  ///< formats of slices it takes, such as gcvf; a free list
+  std::string printer_notes;            ///< for SL1 files, such as FILEFORMAT_GOO
   /// How far a droplet spreads: standard deviation of a Gaussian along each axis; zero where
   /// unknown.
   openvdb::Vec3d point_spread_mm{0.0};
