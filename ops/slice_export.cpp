@@ -12,7 +12,9 @@
 
 #include "io/file/file_name.h"
 #include "io/profile/material_table.h"
+#include "io/profile/printer_profile.h"
 #include "io/stack/slice_format.h"
+#include "io/stack/slice_frame.h"
 #include "io/stack/slice_spans.h"
 #include "io/stack/stack_files.h"
 #include "io/stack/stack_writer.h"
@@ -31,28 +33,36 @@ namespace {
 class SliceExport : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("folder", folder_, "Folder for the stack, or a zip archive: NAME.zip");
+    std::string endings;
+    std::string prescribed;
+    for (const SliceFormat* format : sliceFormats()) {
+      if (!format->container_ending.empty())
+        endings += ", NAME" + std::string(format->container_ending);
+    }
+    prescribed = sliceFormatNames([](const auto& format) { return format.names != nullptr; });
+    options.positional("folder", folder_,
+                       "Folder for the stack, a zip archive NAME.zip, or a container" + endings);
     std::vector<Word> formats;
     for (const SliceFormat* format : sliceFormats()) {
       formats.push_back({std::string(format->name), std::string(format->summary)});
       encoders_[format] = format->encoder();
     }
-    options.choice("format", format_name_, std::move(formats), "Format of the slices");
-    options.text("prefix", names_.prefix, "TEXT", "Beginning of the file names");
+    options.choice("format", format_name_, std::move(formats),
+                   "Format of the slices; the name of a container says its own");
+    options.noteGiven(format_given_);
+    options.text("prefix", names_.prefix, "TEXT",
+                 "Beginning of the file names; " + prescribed + " prescribe their names");
+    options.noteGiven(name_given_);
     options.integer("digits", names_.digits, {1, 9},
                     "Digits of the number of a slice, with zeros in front");
+    options.noteGiven(name_given_);
     options.integer("first", names_.first, {0, 1000000}, "Number of the lowest slice");
+    options.noteGiven(name_given_);
     options.flag(
         "keep-blank", keep_blank_,
         "Writes the blank slices below and above the part too, which pieces of a job need to be "
         "numbered alike; exr always has them");
-    options.integer("padding", stack_.layout.padding, {0, 100000},
-                    "Empty voxels added on each side in x and y");
-    options.flag(
-        "flip-x", stack_.layout.flip_x,
-        "Mirrors left to right; by default a slice is seen from above, with x to the right");
-    options.flag("flip-y", stack_.layout.flip_y,
-                 "Mirrors top to bottom; by default the maximum y is the top row");
+    frame_.declare(options);
     options.text("background", background_, "COLOUR",
                  "Colour of empty voxels in " + sliceFormatNames([](const auto& format) {
                    return format.showsColours();
@@ -65,18 +75,19 @@ class SliceExport : public Sink {
     schema_ = in;
     if (in.lattice.box.empty())
       throw DataError("there is nothing to slice: the lattice has no voxels");
-    format_ = findSliceFormat(format_name_);
-    encoder_ = encoders_.at(format_).get();
+    planFormat();
     planStack();
     planMaterials();
     planColours();
     planNames();
     StackOutput::check(folder_, overwrite_.overwrite,
                        [this](const std::string& text) { report().warn(text); });
-    if (in.lattice.box.dim().x() + std::int64_t{2} * stack_.layout.padding > 1 << 24 ||
-        in.lattice.box.dim().y() + std::int64_t{2} * stack_.layout.padding > 1 << 24) {
-      throw UsageError("slices would be more than 16777216 voxels wide");
-    }
+    const PrinterProfile printer = printerProfileOf(in);
+    planFrame(
+        frame_, *format_, printer, [this](const std::string& text) { report().warn(text); },
+        stack_);
+    checkPrinterTakes(*format_, printer, stack_);
+    minimum_layers_ = format_->showsColours() ? printer.minimum_slices : 0;
     encoder_->plan(stack_, in.grids);
   }
 
@@ -102,7 +113,8 @@ class SliceExport : public Sink {
   }
 
   void write(const Slab& in) override {
-    if (!writer_) writer_.emplace(folder_, stack_, names_, *encoder_, keep_blank_);
+    if (!writer_) writer_.emplace(folder_, stack_, names_, *encoder_, blankLayers());
+    checkWithin(in);
     const int together =
         leaf_layers * ((tbb::this_task_arena::max_concurrency() + leaf_layers - 1) / leaf_layers);
     for (int z = in.core.begin; z < in.core.end;) {
@@ -133,6 +145,30 @@ class SliceExport : public Sink {
     return static_cast<double>(format_->filesOfLayer(stack_.materials.size()));
   }
 
+  /// The name of a container says its format.
+  void planFormat() {
+    const SliceFormat* container = sliceFormatOfContainer(folder_);
+    if (format_given_.empty() && container != nullptr) format_name_ = container->name;
+    format_ = findSliceFormat(format_name_);
+    if (container != format_ && (container != nullptr || !format_->container_ending.empty())) {
+      throw UsageError(
+          "--format: the name of " +
+          (container != nullptr ? "a " + std::string(container->name) : "a " + format_name_) +
+          " ends with " +
+          std::string(container != nullptr ? container->container_ending
+                                           : format_->container_ending) +
+          ", that of other stacks does not; it is '" + folder_ + "'");
+    }
+    if (format_->names != nullptr) {
+      if (!name_given_.empty()) {
+        throw UsageError(name_given_ + ": " + format_name_ +
+                         " prescribes the names of its files; leave it out");
+      }
+      names_ = *format_->names;
+    }
+    encoder_ = encoders_.at(format_).get();
+  }
+
   /// Plans everything about the stack except its materials.
   void planStack() {
     const auto metadata = [&](std::string_view key) {
@@ -145,7 +181,6 @@ class SliceExport : public Sink {
     std::istringstream history(metadata(history_key));
     for (std::string line; std::getline(history, line);) stack_.history.push_back(line);
     stack_.lattice = schema_.lattice;
-    stack_.layout.box = schema_.lattice.box;
   }
 
   void planMaterials() {
@@ -189,8 +224,9 @@ class SliceExport : public Sink {
       throw DataError(
           format_name_ + " has a folder for each material, and the name of the material '" +
           material.name + "' " + *problem + "; give it another one with material-assign, or take " +
-          sliceFormatNames(
-              [](const SliceFormat& other) { return other.pixel != SlicePixel::one_material; }));
+          sliceFormatNames([](const SliceFormat& other) {
+            return other.pixel != SlicePixel::one_material && other.container_ending.empty();
+          }));
     }
   }
 
@@ -217,6 +253,26 @@ class SliceExport : public Sink {
     }
   }
 
+  [[nodiscard]] BlankLayers blankLayers() const {
+    return {.keep = keep_blank_, .minimum_layers = minimum_layers_};
+  }
+
+  /// A tray may be smaller than the lattice around the part, but not than the part.
+  void checkWithin(const Slab& in) const {
+    const openvdb::CoordBBox& frame = stack_.layout.box;
+    const openvdb::CoordBBox& all = schema_.lattice.box;
+    const auto cuts = [&](const openvdb::CoordBBox& box) {
+      return box.min().x() < frame.min().x() || box.max().x() > frame.max().x() ||
+             box.min().y() < frame.min().y() || box.max().y() > frame.max().y();
+    };
+    if (!cuts(all)) return;
+    const openvdb::CoordBBox printed = in.grids.at(stack_.grid)->evalActiveVoxelBoundingBox();
+    if (printed.empty() || !cuts(printed)) return;
+    throw DataError(
+        "the part reaches beyond the display or tray; make it smaller, or give --tray "
+        "centred");
+  }
+
   [[nodiscard]] std::vector<SpanImage> slices(const Slab& in, ZRange layers) const {
     return stack_.grid == material_grid
                ? sliceSpans(*findGrid<openvdb::Int32Grid>(in.grids, material_grid), stack_.layout,
@@ -229,7 +285,11 @@ class SliceExport : public Sink {
   std::string format_name_ = "png";
   std::string background_ = "0,0,0,255";
   SliceNames names_{"slice_", 5, 0};
+  FrameOptions frame_;
   bool keep_blank_ = false;
+  int minimum_layers_ = 0;
+  std::string format_given_;
+  std::string name_given_;
   OverwriteOption overwrite_;
   std::map<const SliceFormat*, std::unique_ptr<SliceEncoder>> encoders_;
 

@@ -10,7 +10,7 @@
 
 #include "io/mesh/mesh_file.h"
 #include "io/mesh/threemf_model.h"
-#include "io/mesh/xml_reader.h"
+#include "io/file/xml_reader.h"
 
 namespace vdbdither {
 

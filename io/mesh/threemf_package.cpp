@@ -7,7 +7,7 @@
 #include <charconv>
 #include <optional>
 
-#include "io/mesh/xml_reader.h"
+#include "io/file/xml_reader.h"
 
 namespace vdbdither {
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "io/stack/image_order.h"
+#include "io/stack/slice_format.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/words.h"
 
@@ -106,13 +107,12 @@ bool ImageStack::isAt(const fs::path& path) {
   if (isPattern(path)) return true;
   std::error_code none;
   const fs::file_status status = fs::status(path, none);
-  if (fs::is_directory(status)) {
-    return fs::symlink_status(path / manifest_name, none).type() == fs::file_type::not_found;
-  }
-  if (!fs::is_regular_file(status) || equalsIgnoringCase(path.extension().string(), ".json"))
+  if (!fs::is_directory(status) &&
+      (!fs::is_regular_file(status) || equalsIgnoringCase(path.extension().string(), ".json")))
     return false;
   try {
-    return !StackInput::withoutManifest(path).contains(manifest_name);
+    const StackInput files = StackInput::withoutManifest(path);
+    return !files.contains(manifest_name) && !describedStack(files);
   } catch (const DataError&) {
     return false;
   }

@@ -14,8 +14,8 @@ namespace vdbdither {
 /// Slices of another program: numbered images of one size without a manifest, PNG or TIFF.
 class ImageStack {
  public:
-  /// Whether `path` is a folder or a zip archive without a manifest, or a pattern with `*` in the
-  /// name of the file. What cannot be read is none.
+  /// Whether `path` is a folder or a zip archive without a manifest and no container, or a pattern
+  /// with `*` in the name of the file. What cannot be read is none.
   static bool isAt(const std::filesystem::path& path);
 
   /// Finds and orders the slices, and reads the first one.

@@ -164,6 +164,12 @@ class ManifestParser {
     return result;
   }
 
+  [[nodiscard]] int frame(const std::string& key, int axis) const {
+    const ordered_json& values = list(member(json_, "frame"), key);
+    if (values.size() != 2) refuse("'" + key + "' of 'frame' must be two whole numbers");
+    return integerOf(values[static_cast<std::size_t>(axis)], key, -farthest, farthest);
+  }
+
   [[nodiscard]] std::array<std::uint8_t, 4> colour(const ordered_json& json,
                                                    const std::string& key) const {
     const ordered_json& values = list(json, key);
@@ -230,11 +236,18 @@ Manifest manifestOf(const ManifestParser& parser) {
   constexpr int most_padding = 1 << 24;
   manifest.layout = {manifest.lattice.box, parser.integer(json, "padding", 0, most_padding),
                      parser.flag(json, "flip_x"), parser.flag(json, "flip_y")};
+  if (json.contains("frame")) {
+    for (int axis = 0; axis < 2; ++axis) {
+      manifest.layout.box.min()[axis] = parser.frame("min", axis);
+      manifest.layout.box.max()[axis] = parser.frame("max", axis);
+    }
+    if (manifest.layout.box.empty()) parser.refuse("'frame' has no voxels");
+  }
   const ordered_json& size = parser.list(json, "size");
   if (size.size() != 3 || size[0] != manifest.layout.width() || size[1] != manifest.layout.height())
     parser.refuse(
-        "'size' must be the width and height that follow from 'box' and 'padding', and the number "
-        "of layers");
+        "'size' must be the width and height that follow from 'box' or 'frame' and 'padding', and "
+        "the number of layers");
   manifest.layers.begin = parser.integer(json, "first_layer", -farthest, farthest);
   manifest.layers.end = manifest.layers.begin + parser.integerOf(size[2], "size", 0, 2 * farthest);
   if (json.contains("cropped")) {
@@ -292,6 +305,11 @@ std::string textOf(const Manifest& manifest) {
   json["first_layer"] = manifest.layers.begin;
   json["cropped"] = {{"below", manifest.cropped_below}, {"above", manifest.cropped_above}};
   json["box"] = {{"min", jsonOf(lattice.box.min())}, {"max", jsonOf(lattice.box.max())}};
+  const openvdb::CoordBBox& frame = layout.box;
+  if (frame != lattice.box) {
+    json["frame"] = {{"min", {frame.min().x(), frame.min().y()}},
+                     {"max", {frame.max().x(), frame.max().y()}}};
+  }
   json["padding"] = layout.padding;
   json["flip_x"] = layout.flip_x;
   json["flip_y"] = layout.flip_y;
@@ -332,7 +350,7 @@ Manifest readManifest(const StackInput& stack, EditedStack edited,
     if (!(lattice.pitch_mm[axis] >= finest_mm))
       throw DataError(shown + ": pitch_mm is below 0.000001" + make_stack_again);
   }
-  const openvdb::Coord size = lattice.box.dim();
+  const openvdb::Coord size = manifest.layout.box.dim();
   constexpr std::int64_t widest = 1 << 24;
   if (lattice.box.empty() || manifest.layers.empty() ||
       size.x() + std::int64_t{2} * manifest.layout.padding > widest ||

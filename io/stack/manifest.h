@@ -21,7 +21,7 @@ struct Manifest {
   struct Slice {
     int layer = 0;
     std::string file;
-    std::string sha256;    ///< of its bytes, hexadecimal
+    std::string sha256;    ///< of its bytes, hexadecimal; empty in a container
     std::string material;  ///< whose voxels it shows; empty: all
   };
 

@@ -40,6 +40,22 @@ const SliceFormat* findSliceFormat(std::string_view name) {
   return nullptr;
 }
 
+const SliceFormat* sliceFormatOfContainer(const std::filesystem::path& path) {
+  const std::string ending = path.extension().string();
+  for (const SliceFormat* format : sliceFormats()) {
+    if (!ending.empty() && equalsIgnoringCase(ending, format->container_ending)) return format;
+  }
+  return nullptr;
+}
+
+std::optional<DescribedStack> describedStack(const StackInput& files) {
+  for (const SliceFormat* format : sliceFormats()) {
+    if (format->describe == nullptr) continue;
+    if (auto described = format->describe(files)) return described;
+  }
+  return std::nullopt;
+}
+
 bool namesSlice(const std::filesystem::path& path) {
   const std::string ending = path.extension().string();
   return std::any_of(sliceFormats().begin(), sliceFormats().end(), [&](const SliceFormat* format) {

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -29,6 +30,13 @@ enum class SlicePixel {
   printed,       ///< whether any material is there
 };
 
+/// How the files of a layer are called: prefix and running number.
+struct SliceNames {
+  std::string prefix;
+  int digits = 1;  ///< of the number, with zeros in front
+  int first = 0;   ///< number of the lowest slice of a job that begins at the lattice's bottom
+};
+
 /// A layer on its way into files.
 struct SliceLayer {
   int z = 0;
@@ -42,6 +50,12 @@ struct SliceFile {
   std::string name;      ///< its place in the stack, with '/' between folders
   std::string material;  ///< whose voxels it shows; empty: all
   std::vector<std::uint8_t> bytes;
+};
+
+/// What a container says of itself.
+struct DescribedStack {
+  std::string file;   ///< the name of its configuration
+  Manifest manifest;  ///< without digests, history and printer
 };
 
 /// Makes the files of a stack in one format. A format of single images implements `encode` alone; a
@@ -109,6 +123,19 @@ struct SliceFormat {
   double bytes_per_leaf = 0;
   std::size_t most_materials = std::numeric_limits<std::size_t>::max();
 
+  /// What the name of a container ends with, `.sl1`: a zip archive that describes itself in place
+  /// of a manifest. Empty for a stack with a manifest.
+  std::string_view container_ending = {};
+  /// Returns what a container says of itself, or nothing if its configuration is not among `files`.
+  /// Throws DataError.
+  std::optional<DescribedStack> (*describe)(const StackInput& files) = nullptr;
+  /// The names that the format prescribes; null where the user chooses them.
+  const SliceNames* names = nullptr;
+  /// Whether a slice shows the whole display of the printer, mirrored as the profile says.
+  bool shows_display = false;
+  /// The width of a slice is a multiple of this.
+  int width_multiple = 1;
+
   /// Returns how many files a layer has.
   [[nodiscard]] std::size_t filesOfLayer(std::size_t materials) const {
     return pixel == SlicePixel::one_material ? materials : 1;
@@ -134,6 +161,12 @@ std::span<const SliceFormat* const> sliceFormats();
 
 /// Returns the format called `name`, or null.
 const SliceFormat* findSliceFormat(std::string_view name);
+
+/// Returns the format whose containers end like `path`, case aside, or null.
+const SliceFormat* sliceFormatOfContainer(const std::filesystem::path& path);
+
+/// Returns what the container `files` says of itself, or nothing if it is none. Throws DataError.
+std::optional<DescribedStack> describedStack(const StackInput& files);
 
 /// Whether `path` ends like a slice of some format, case aside.
 bool namesSlice(const std::filesystem::path& path);

@@ -370,6 +370,11 @@ SpanImage blankSlice(const SliceLayout& layout) {
   return image;
 }
 
+SpanImage onlyValue(SpanImage slice, std::uint32_t value) {
+  for (Span& span : slice.spans) span.value = span.value == value ? 1 : 0;
+  return slice;
+}
+
 bool isBlank(const SpanImage& slice) {
   return std::all_of(slice.spans.begin(), slice.spans.end(),
                      [](const Span& span) { return span.value == 0; });

@@ -9,8 +9,9 @@
 
 namespace vdbdither {
 
-/// Which voxels of a layer a picture shows, and which way round: seen from above, x to the right
-/// and y upwards, so that the first row holds the greatest y.
+/// Which voxels of a layer a picture shows, also such as are not of the lattice's box and empty,
+/// and which way round: seen from above, x to the right and y upwards, so that the first row holds
+/// the greatest y.
 struct SliceLayout {
   openvdb::CoordBBox box;  ///< columns and rows come from its x and y, inclusive
   int padding = 0;         ///< empty voxels added on each side
@@ -35,6 +36,9 @@ SpanImage blankSlice(const SliceLayout& layout);
 
 /// Whether no voxel of it is printed.
 bool isBlank(const SpanImage& slice);
+
+/// 1 where `slice` has this value, else 0.
+SpanImage onlyValue(SpanImage slice, std::uint32_t value);
 
 /// The way back: a grid whose layers are the pictures `images`, the first one of them the layer
 /// `layers.begin`; 0 is inactive. What lies outside the layout's box is left out. In canonical

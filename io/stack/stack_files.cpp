@@ -4,7 +4,7 @@
 
 #include "io/file/file_name.h"
 #include "io/file/whole_file.h"
-#include "io/stack/manifest.h"
+#include "io/stack/slice_format.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/words.h"
 
@@ -42,7 +42,8 @@ fs::path unslashed(const fs::path& path) { return path.has_filename() ? path : p
 }  // namespace
 
 bool namesArchive(const fs::path& path) {
-  return equalsIgnoringCase(unslashed(path).extension().string(), archive_ending);
+  return equalsIgnoringCase(unslashed(path).extension().string(), archive_ending) ||
+         sliceFormatOfContainer(unslashed(path)) != nullptr;
 }
 
 void StackOutput::check(const fs::path& target, bool overwrite,
@@ -86,7 +87,11 @@ StackInput::StackInput(const fs::path& path) : place_(path), manifest_name_(mani
   } else if (!fs::is_directory(status)) {
     zip_ = std::make_unique<ZipReader>(path);
   }
-  if (!contains(manifest_name_)) {
+  if (contains(manifest_name_)) return;
+  if (auto described = describedStack(*this)) {
+    manifest_name_ = described->file;
+    described_ = std::make_shared<const DescribedStack>(*std::move(described));
+  } else {
     throw DataError("'" + path.string() + "' holds no " + manifest_name +
                     ", so it is not a stack made by slice-export");
   }

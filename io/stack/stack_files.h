@@ -14,6 +14,8 @@
 
 namespace vdbdither {
 
+struct DescribedStack;
+
 /// The name of the file that describes a stack.
 inline constexpr const char* manifest_name = "manifest.json";
 /// The name of the picture of the whole stack.
@@ -21,11 +23,12 @@ inline constexpr const char* preview_name = "preview.png";
 /// The ending of the name of a stack that is an archive.
 inline constexpr const char* archive_ending = ".zip";
 
-/// Whether a stack of this name is a zip archive, case aside, and not a folder.
+/// Whether a stack of this name is a zip archive and not a folder: it ends with `.zip` or like a
+/// container, case aside.
 bool namesArchive(const std::filesystem::path& path);
 
-/// The files of a stack of slices on their way to disk: a folder, or a zip archive where the name
-/// ends with `.zip`. It exists under its name only once it is complete.
+/// The files of a stack of slices on their way to disk: a folder, or an archive where the name says
+/// so. It exists under its name only once it is complete.
 class StackOutput {
  public:
   /// Checks that `target` can be written. An existing folder must be a stack and hold nothing else
@@ -49,7 +52,7 @@ class StackOutput {
 /// folders. Symbolic links lead to files of the same stack only.
 class StackInput {
  public:
-  /// `path`: a stack's folder, its manifest, or its zip archive. Throws DataError.
+  /// `path`: a stack's folder, its manifest, its zip archive, or a container. Throws DataError.
   explicit StackInput(const std::filesystem::path& path);
 
   /// The files of a folder or a zip archive that has no manifest. Throws DataError.
@@ -61,9 +64,13 @@ class StackInput {
 
   /// The path of the file called `name`, for messages.
   [[nodiscard]] std::string shown(const std::string& name) const;
-  /// The name of the manifest among the files.
+  /// The name of the manifest among the files, or of what describes a container.
   [[nodiscard]] const std::string& manifestName() const { return manifest_name_; }
   [[nodiscard]] std::string shownManifest() const { return shown(manifest_name_); }
+  /// What a container says of itself; nothing where there is a manifest.
+  [[nodiscard]] const std::shared_ptr<const DescribedStack>& described() const {
+    return described_;
+  }
   [[nodiscard]] bool contains(const std::string& name) const;
   /// The names of all files.
   [[nodiscard]] std::vector<std::string> names() const;
@@ -83,6 +90,7 @@ class StackInput {
   std::filesystem::path place_;
   std::string manifest_name_;
   std::unique_ptr<ZipReader> zip_;
+  std::shared_ptr<const DescribedStack> described_;
 };
 
 }  // namespace vdbdither

@@ -15,7 +15,7 @@ namespace vdbdither {
 /// Reads the slices of a stack back.
 class StackReader {
  public:
-  /// @param path    the stack's folder, its manifest, or its zip archive
+  /// @param path    the stack's folder, its manifest, its zip archive, or a container
   /// @param edited  whether a stack is accepted whose manifest or slices changed after they were
   ///                written; every layer must still have exactly one file of each kind
   /// @param warn    called from any thread, once for each kind of change that is accepted

@@ -1,5 +1,6 @@
 #include "io/stack/stack_writer.h"
 
+#include <algorithm>
 #include <numeric>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "io/file/digest.h"
 #include "io/image/png_spans.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -32,16 +34,17 @@ struct StackWriter::Layer {
 };
 
 StackWriter::StackWriter(const std::filesystem::path& target, Manifest stack, SliceNames names,
-                         const SliceEncoder& encoder, bool keep_blank)
+                         const SliceEncoder& encoder, BlankLayers blank)
     : stack_(std::move(stack)),
       names_(std::move(names)),
       encoder_(encoder),
-      keep_blank_(keep_blank || !encoder.reads().empty()),
+      blank_(blank),
       lowest_(stack_.lattice.layers().begin),
       output_(target),
       preview_(stack_.lattice.pitch_mm, stack_.layout.width(), stack_.layout.height(),
                stack_.lattice.layers(), displayColours(stack_.materials)) {
   stack_.voxels.assign(stack_.materials.size(), 0);
+  if (!encoder.reads().empty()) blank_.keep = true;
 }
 
 void StackWriter::add(ZRange layers, std::vector<SpanImage> images, const Grids& grids) {
@@ -54,7 +57,7 @@ void StackWriter::add(ZRange layers, std::vector<SpanImage> images, const Grids&
   std::vector<Layer> ready;
   for (int z = layers.begin; z < layers.end; ++z) {
     SpanImage& image = images[static_cast<std::size_t>(z - layers.begin)];
-    if (!keep_blank_ && isBlank(image)) {
+    if (!blank_.keep && isBlank(image)) {
       ++waiting_;
       continue;
     }
@@ -98,7 +101,12 @@ void StackWriter::encodeAll(std::vector<Layer> all, const Grids& grids) {
 
 const Manifest& StackWriter::finish() {
   if (!stack_.layers.empty() && known_.end == stack_.lattice.layers().end) {
-    stack_.cropped_above = waiting_;
+    const int needed = std::clamp(blank_.minimum_layers - stack_.layers.size(), 0, waiting_);
+    stack_.cropped_above = waiting_ - needed;
+    waiting_ = needed;
+    std::vector<Layer> blank;
+    release(known_.end - stack_.cropped_above, blank);
+    encodeAll(std::move(blank), {});
   } else {
     std::vector<Layer> blank;
     release(known_.end, blank);
@@ -110,10 +118,7 @@ const Manifest& StackWriter::finish() {
 }
 
 std::string StackWriter::nameOf(int z) const {
-  std::string number = std::to_string(names_.first + z - lowest_);
-  if (number.size() < static_cast<std::size_t>(names_.digits))
-    number.insert(0, names_.digits - number.size(), '0');
-  return names_.prefix + number;
+  return names_.prefix + zeroPadded(names_.first + z - lowest_, names_.digits);
 }
 
 void StackWriter::encode(Layer& layer, const Grids& grids) const {

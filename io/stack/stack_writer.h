@@ -10,11 +10,10 @@
 
 namespace vdbdither {
 
-/// How the files of a layer are called: prefix and running number.
-struct SliceNames {
-  std::string prefix;
-  int digits = 1;  ///< of the number, with zeros in front
-  int first = 0;   ///< number of the lowest slice of a job that begins at the lattice's bottom
+/// Which of the blank layers next to the lattice's bottom and top a stack holds.
+struct BlankLayers {
+  bool keep = false;       ///< all of them
+  int minimum_layers = 0;  ///< those at the top without which there are fewer layers in all
 };
 
 /// Writes a stack of slices, layer by layer. It exists under its name once it is complete.
@@ -22,12 +21,10 @@ class StackWriter {
  public:
   /// @param stack    all but its layers, slices and voxels
   /// @param encoder  planned with the same; must outlive the writer
-  /// @param keep_blank  false: blank layers next to the lattice's bottom and top are left out,
-  /// unless
-  ///                    no layer has a voxel or the encoder reads other grids
+  /// @param blank    all are kept also where no layer has a voxel or the encoder reads other grids
   /// Throws DataError.
   StackWriter(const std::filesystem::path& target, Manifest stack, SliceNames names,
-              const SliceEncoder& encoder, bool keep_blank);
+              const SliceEncoder& encoder, BlankLayers blank);
 
   /// Adds layers, which follow on those before.
   /// @param images  of each of the layers, the index of the material of each voxel
@@ -56,7 +53,7 @@ class StackWriter {
   Manifest stack_;
   SliceNames names_;
   const SliceEncoder& encoder_;
-  bool keep_blank_;
+  BlankLayers blank_;
   ZRange known_;     ///< the layers that came
   int waiting_ = 0;  ///< the last blank ones of these
   int lowest_;       ///< the layer that is number `first`

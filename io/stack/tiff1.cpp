@@ -5,17 +5,11 @@ namespace vdbdither {
 
 namespace {
 
-/// 1 where `image` has this value, else 0.
-SpanImage masked(SpanImage image, std::uint32_t value) {
-  for (Span& span : image.spans) span.value = span.value == value ? 1 : 0;
-  return image;
-}
-
 class BitTiffSlices : public SliceEncoder {
  public:
   [[nodiscard]] std::vector<SliceFile> encode(const SliceLayer& layer) const override {
     return forEachMaterial(layer, ".tif", [&](std::uint32_t material) {
-      return encodeTiff(masked(layer.image, material), {{}, pitchMm().x(), pitchMm().y()});
+      return encodeTiff(onlyValue(layer.image, material), {{}, pitchMm().x(), pitchMm().y()});
     });
   }
 };

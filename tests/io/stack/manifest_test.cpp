@@ -240,8 +240,8 @@ TEST(Manifest, RefusesValuesThatAreNone) {
   EXPECT_EQ(with("\"first_layer\": 4", "\"first_layer\": 4e18"),
             "'first_layer' must be a whole number from -536870912 to 536870912");
   EXPECT_EQ(with("  6,\n  4,\n", "  6,\n  5,\n"),
-            "'size' must be the width and height that follow from 'box' and 'padding', and the "
-            "number of layers");
+            "'size' must be the width and height that follow from 'box' or 'frame' and 'padding', "
+            "and the number of layers");
   EXPECT_EQ(with("  26,\n    26", "  26,\n    282") == "", false);
   EXPECT_EQ(with(" 29,", " 285,"), "'rgba' must be a whole number from 0 to 255");
   EXPECT_EQ(with("  2,\n  3,\n  0\n", "  2,\n  3\n"), "'background' must be four whole numbers");

@@ -45,7 +45,7 @@ class Stack : public testing::Test {
     const std::unique_ptr<SliceEncoder> encoder = findSliceFormat(format)->encoder();
     encoder->plan(stack, {});
     fs::remove_all(scratch_ / name);
-    StackWriter writer(scratch_ / name, stack, {"s", 1, 0}, *encoder, true);
+    StackWriter writer(scratch_ / name, stack, {"s", 1, 0}, *encoder, {.keep = true});
     std::vector<SpanImage> images;
     for (int z = 0; z < 5; ++z) {
       images.push_back(test::spanImage(

@@ -1,7 +1,7 @@
 // "Extensible Markup Language (XML) 1.0", fifth edition, and "Namespaces in XML 1.0", third
 // edition, W3C, as expat parses them.
 
-#include "io/mesh/xml_reader.h"
+#include "io/file/xml_reader.h"
 
 #include <algorithm>
 #include <array>
@@ -110,6 +110,12 @@ struct XmlReader::Callbacks {
     });
   }
 
+  static void XMLCALL text(void* data, const char* piece, int size) {
+    guarded(data, [&](XmlReader& reader) {
+      reader.text(std::string_view(piece, static_cast<std::size_t>(size)));
+    });
+  }
+
   static void XMLCALL declare(void* data, const char* prefix, const char* space) {
     guarded(data, [&](XmlReader& reader) {
       if (viewOf(space).size() > longest_space) {
@@ -134,6 +140,7 @@ XmlReader::XmlReader(std::string shown)
   if (parser == nullptr) throw std::bad_alloc();
   XML_SetUserData(parser, this);
   XML_SetElementHandler(parser, Callbacks::begin, Callbacks::end);
+  XML_SetCharacterDataHandler(parser, Callbacks::text);
   XML_SetStartNamespaceDeclHandler(parser, Callbacks::declare);
   XML_SetStartDoctypeDeclHandler(parser, Callbacks::documentType);
 }

@@ -51,6 +51,8 @@ class XmlReader {
   virtual void begin(const XmlElement& element) = 0;
   /// The innermost element ends.
   virtual void end() = 0;
+  /// A piece of text within the innermost element; one text may come in several.
+  virtual void text(std::string_view /*piece*/) {}
   /// The next element declares a prefix of a namespace.
   virtual void declare(std::string_view /*prefix*/, std::string_view /*space*/) {}
 
