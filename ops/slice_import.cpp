@@ -204,6 +204,7 @@ struct ImageOptions {
   [[nodiscard]] std::string given() const {
     if (target.pitch_mm) return "--pitch";
     if (!target.printer.empty()) return "--printer";
+    if (target.layer_mm) return "--layer";
     if (!materials.empty()) return "--materials";
     if (!background.empty()) return "--background";
     return flip_x ? "--flip-x" : flip_y ? "--flip-y" : "";

@@ -13,12 +13,34 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::Vec3d;
 
+namespace {
+
+/// Throws UsageError unless the printer takes layers of `layer_mm`.
+void checkLayer(double layer_mm, const PrinterProfile& profile) {
+  const std::string printer = "--layer: the printer '" + profile.name + "' ";
+  if (!profile.layer_mm)
+    throw UsageError(printer + "has layers of " + shortestText(profile.pitch_mm[2]) +
+                     " mm; its profile states no range (layer_mm)");
+  const openvdb::Vec2d& range = *profile.layer_mm;
+  if (layer_mm < range[0] || layer_mm > range[1])
+    throw UsageError(printer + "takes layers from " + shortestText(range[0]) + " to " +
+                     shortestText(range[1]) + " mm");
+}
+
+}  // namespace
+
 Vec3d targetPitchMm(const LatticeOptions& target, Schema& schema) {
   if (target.printer.empty() != target.pitch_mm.has_value())
     throw UsageError(
         "give either --printer NAME (vdbdither printers lists them) or --pitch DX,DY,DZ");
+  if (target.pitch_mm && target.layer_mm)
+    throw UsageError("--layer goes with --printer; --pitch states the height of a layer itself");
   if (target.pitch_mm) return *target.pitch_mm;
-  const PrinterProfile profile = readPrinterProfile(target.printer);
+  PrinterProfile profile = readPrinterProfile(target.printer);
+  if (target.layer_mm) {
+    checkLayer(*target.layer_mm, profile);
+    profile.pitch_mm[2] = *target.layer_mm;
+  }
   schema.metadata[printer_key] = toJson(profile);
   return profile.pitch_mm;
 }

@@ -8,9 +8,10 @@
 namespace vdbdither {
 
 /// Returns the pitch in mm that --printer or --pitch sets. The profile of a printer is added to the
-/// metadata of `schema`.
+/// metadata of `schema`, with the layer that --layer sets.
 ///
-/// Throws UsageError unless exactly one of the two is given, and what readPrinterProfile throws.
+/// Throws UsageError unless exactly one of the two is given, and if the printer does not take
+/// layers as high as --layer; and what readPrinterProfile throws.
 openvdb::Vec3d targetPitchMm(const LatticeOptions& target, Schema& schema);
 
 /// The lattice of a part between `min_mm` and `max_mm`, with the voxels within `margin_mm` of that

@@ -31,6 +31,8 @@ TEST(OptionGroups, ALatticeIsAPrinterOrAPitch) {
   options.parse(Words{"--pitch", "42um,84um,22um"});
   EXPECT_EQ(lattice.pitch_mm, openvdb::Vec3d(0.042, 0.084, 0.022));
   EXPECT_EQ(options.find("printer")->completion, Option::Completion::printer);
+  options.parse(Words{"--printer", "p", "--layer", "30um"});
+  EXPECT_EQ(lattice.layer_mm, 0.03);
 }
 
 TEST(OptionGroups, ListsOfGridsAreEmptyWhereAllAreMeant) {

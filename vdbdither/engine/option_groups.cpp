@@ -66,6 +66,9 @@ void LatticeOptions::declare(Options& options) {
                "Printer whose lattice is used: a name that `vdbdither printers` lists, or a "
                "profile");
   options.completion(Option::Completion::printer);
+  options.length(
+      "layer", layer_mm, pitches_mm,
+      "Height of a layer in place of the printer's own, within the range of its profile");
   options.lengths("pitch", pitch_mm, "DX,DY,DZ", pitches_mm,
                   "Pitch of the lattice, in place of --printer");
 }

@@ -46,10 +46,12 @@ struct MeshPlacementOptions : PlacementOptions {
   void declare(Options& options, const std::string& mesh);
 };
 
-/// `--printer` and `--pitch`: the lattice to print on. One of them must be given, which
-/// targetPitchMm (io/profile/target_lattice.h) checks.
+/// `--printer`, `--layer` and `--pitch`: the lattice to print on. A printer or a pitch must be
+/// given, and the layer with a printer alone, which targetPitchMm (io/profile/target_lattice.h)
+/// checks.
 struct LatticeOptions {
   std::string printer;
+  std::optional<double> layer_mm;  ///< the height of a layer in place of the printer's usual one
   std::optional<openvdb::Vec3d> pitch_mm;
 
   void declare(Options& options);
