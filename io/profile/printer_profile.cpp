@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "io/file/data_files.h"
 #include "io/file/whole_file.h"
+#include "io/profile/json_lines.h"
 #include "io/profile/profile_parser.h"
 #include "vdbdither/engine/json_text.h"
 #include "vdbdither/model/errors.h"
@@ -32,10 +35,33 @@ ordered_json jsonOf(const Material& material) {
   return json;
 }
 
-PrinterProfile parse(const std::string& text) {
+struct CheckedProfile {
+  PrinterProfile profile;
+  std::vector<std::string> problems;  ///< by line
+};
+
+/// \param stem  the name of the file without its ending, if the profile must have it
+CheckedProfile checkedProfile(const std::string& text,
+                              const std::optional<std::string>& stem = std::nullopt) {
+  if (std::string problem = jsonSyntaxProblem(text); !problem.empty())
+    return {{}, {std::move(problem)}};
   const ProfileParser parser(parsedJson(text));
-  if (!parser.problems().empty()) throw DataError(parser.problems().front().message);
-  return parser.profile();
+  std::vector<ProfileProblem> problems = parser.problems();
+  const std::string& name = parser.profile().name;
+  if (stem && !name.empty() && name != *stem)
+    problems.push_back({{"name"}, "its name '" + name + "' is not that of its file"});
+  const JsonLines lines = jsonLines(text);
+  std::vector<std::pair<int, std::string>> by_line;
+  for (const auto& [line, key] : lines.repeated)
+    by_line.emplace_back(line, "'" + key + "' is there twice");
+  for (const ProfileProblem& problem : problems)
+    by_line.emplace_back(lines.of(problem.path), problem.message);
+  std::stable_sort(by_line.begin(), by_line.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  CheckedProfile checked{parser.profile(), {}};
+  for (const auto& [line, message] : by_line)
+    checked.problems.push_back("line " + std::to_string(line) + ": " + message);
+  return checked;
 }
 
 /// The file that `name_or_path` names and what it holds.
@@ -64,21 +90,18 @@ std::pair<std::filesystem::path, std::string> readProfile(const std::string& nam
 
 PrinterProfile readPrinterProfile(const std::string& name_or_path) {
   const auto [path, text] = readProfile(name_or_path);
-  try {
-    return parse(text);
-  } catch (const DataError& error) {
-    throw DataError("'" + path.string() + "' is not a printer profile: " + error.what());
-  }
+  CheckedProfile checked = checkedProfile(text);
+  if (checked.problems.empty()) return std::move(checked.profile);
+  std::string message =
+      "'" + path.string() + "' is not a printer profile: " + checked.problems.front();
+  if (const std::size_t more = checked.problems.size() - 1; more > 0)
+    message += " (and " + std::to_string(more) + " more; `vdbdither printers check` lists them)";
+  throw DataError(message);
 }
 
 std::vector<std::string> printerProfileProblems(const std::string& name_or_path) {
   const auto [path, text] = readProfile(name_or_path);
-  const ProfileParser parser(parsedJson(text));
-  std::vector<std::string> problems;
-  for (const ProfileProblem& problem : parser.problems()) problems.push_back(problem.message);
-  if (!parser.profile().name.empty() && parser.profile().name != path.stem())
-    problems.push_back("its name '" + parser.profile().name + "' is not that of its file");
-  return problems;
+  return checkedProfile(text, path.stem().string()).problems;
 }
 
 std::string toJson(const PrinterProfile& profile) {
@@ -110,12 +133,11 @@ std::string toJson(const PrinterProfile& profile) {
 }
 
 PrinterProfile printerProfileFromJson(const std::string& text) {
-  try {
-    return parse(text);
-  } catch (const DataError& error) {
-    throw DataError(std::string("the metadata vdbdither:printer is not a printer profile: ") +
-                    error.what());
-  }
+  const ProfileParser parser(parsedJson(text));
+  if (!parser.problems().empty())
+    throw DataError("the metadata vdbdither:printer is not a printer profile: " +
+                    parser.problems().front().message);
+  return parser.profile();
 }
 
 PrinterProfile printerProfileOf(const Schema& schema) {
@@ -135,7 +157,9 @@ std::vector<std::string> installedPrinters() {
   for (const std::filesystem::path& folder : dataFolders()) {
     std::error_code none;
     for (const auto& entry : std::filesystem::directory_iterator(folder / "printers", none)) {
-      if (entry.path().extension() == ".json") names.push_back(entry.path().stem());
+      const bool is_profile =
+          entry.path().extension() == ".json" && entry.path().stem() != "schema";
+      if (is_profile) names.push_back(entry.path().stem());
     }
   }
   std::sort(names.begin(), names.end());

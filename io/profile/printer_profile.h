@@ -13,8 +13,8 @@ namespace vdbdither {
 /// there are), DataError when it is malformed.
 PrinterProfile readPrinterProfile(const std::string& name_or_path);
 
-/// Everything that is wrong with the profile called `name_or_path`, a line each. Throws UsageError
-/// when there is none.
+/// Everything that is wrong with the profile called `name_or_path`: texts that begin with the line
+/// of the file, in its order. Throws UsageError when there is none.
 std::vector<std::string> printerProfileProblems(const std::string& name_or_path);
 
 /// The profile in one line of JSON, as grids carry it under `vdbdither:printer`; and back.
@@ -28,7 +28,7 @@ PrinterProfile printerProfileOf(const Schema& schema);
 /// as the profile in the metadata of `schema` states it, or 50 µm by convention. Throws DataError.
 openvdb::Vec3d pointSpreadMmOf(const Schema& schema);
 
-/// The names of the profiles in the data folder, sorted.
+/// The names of the profiles in the data folder, sorted. Their schema, schema.json, is none.
 std::vector<std::string> installedPrinters();
 
 }  // namespace vdbdither

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "io/file/file_name.h"
 #include "vdbdither/engine/options.h"
@@ -18,21 +19,6 @@ using nlohmann::ordered_json;
 namespace {
 
 constexpr int most_px = 1 << 24;
-
-/// A key as a part of a JSON pointer.
-std::string escaped(const std::string& key) {
-  std::string result;
-  for (const char c : key) {
-    if (c == '~') {
-      result += "~0";
-    } else if (c == '/') {
-      result += "~1";
-    } else {
-      result += c;
-    }
-  }
-  return result;
-}
 
 /// A whole number within a range; 3.0 is one.
 std::optional<int> wholeNumber(const ordered_json& json, int least, int most) {
@@ -69,14 +55,20 @@ std::optional<double> lengthMm(const ordered_json& json) {
 
 ProfileParser::ProfileParser(const ordered_json& json) {
   if (!json.is_object()) {
-    problems_.push_back({"", "the text is not a JSON object"});
+    problems_.push_back({{}, "the text is not a JSON object"});
     return;
   }
-  const Object object{json, "", ""};
-  known(object,
-        {"name", "title", "source", "technology", "pitch_mm", "layer_mm", "build_mm", "slice_px",
-         "origin", "mirror_x", "mirror_y", "minimum_slices", "maximum_colours", "containers",
-         "printer_notes", "point_spread_mm", "yule_nielsen", "kubelka_munk", "materials"});
+  const Object object{json, {}, ""};
+  known(object, {"$schema",         "name",
+                 "title",           "source",
+                 "technology",      "pitch_mm",
+                 "layer_mm",        "build_mm",
+                 "slice_px",        "origin",
+                 "mirror_x",        "mirror_y",
+                 "minimum_slices",  "maximum_colours",
+                 "containers",      "printer_notes",
+                 "point_spread_mm", "yule_nielsen",
+                 "kubelka_munk",    "materials"});
   identity(object);
   layers(object);
   slices(object);
@@ -89,25 +81,30 @@ ProfileParser::ProfileParser(const ordered_json& json) {
   }
   for (const ordered_json& entry : materials) {
     const std::size_t index = profile_.materials.size();
-    material({entry, "/materials/" + std::to_string(index),
+    material({entry,
+              {"materials", std::to_string(index)},
               "material " + std::to_string(index + 1) + ": "});
   }
 }
 
+/// Notes a problem with the value of `key`, or with the object itself where it is empty.
 void ProfileParser::problem(const Object& object, const std::string& key,
                             const std::string& message) {
-  problems_.push_back(
-      {object.pointer + (key.empty() ? "" : "/" + escaped(key)), object.prefix + message});
+  std::vector<std::string> path = object.path;
+  if (!key.empty()) path.push_back(key);
+  problems_.push_back({std::move(path), object.prefix + message});
 }
 
 /// Notes keys that nobody reads: they may be misspelt.
 void ProfileParser::known(const Object& object, const std::vector<std::string>& keys) {
+  std::string accepted;
+  for (const std::string& key : keys) accepted += (accepted.empty() ? "" : ", ") + key;
   for (const auto& [key, value] : object.json.items()) {
     if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
     const std::string near = nearestWord(key, keys);
     problem(object, key,
-            "'" + key + "' means nothing here" +
-                (near.empty() ? "" : "; did you mean '" + near + "'?"));
+            "'" + key + "' means nothing here; " +
+                (near.empty() ? "accepted are " + accepted : "did you mean '" + near + "'?"));
   }
 }
 
@@ -122,7 +119,7 @@ std::string ProfileParser::name(const Object& object) {
   std::string name = text(object, "name");
   if (name.empty()) {
     if (!object.has("name") || object["name"].is_string())
-      problem(object, object.has("name") ? "name" : "", "there is no name");
+      problem(object, "name", "there is no name");
   } else if (const auto wrong = fileNameProblem(name)) {
     problem(object, "name", "its name " + *wrong);
   }
@@ -174,7 +171,7 @@ std::vector<double> ProfileParser::lengths(const Object& object, const std::stri
   std::ostringstream message;
   message << key << " must be " << (number == 2 ? "two" : "three") << " lengths between " << min_mm
           << " and " << max_mm << " mm";
-  problem(object, object.has(key) ? key : "", message.str());
+  problem(object, key, message.str());
   return std::vector<double>(number, 0.0);
 }
 
@@ -185,6 +182,7 @@ openvdb::Vec3d ProfileParser::lengths3(const Object& object, const std::string& 
 }
 
 void ProfileParser::identity(const Object& object) {
+  (void)text(object, "$schema");  // for editors
   profile_.name = name(object);
   profile_.title = object.has("title") ? text(object, "title") : profile_.name;
   profile_.source = text(object, "source");
@@ -258,7 +256,7 @@ void ProfileParser::optics(const Object& object) {
   const ordered_json& mirror = object["kubelka_munk"];
   if (!mirror.is_object())
     return problem(object, "kubelka_munk", "kubelka_munk must be an object with outer and inner");
-  this->mirror({mirror, "/kubelka_munk", "kubelka_munk: "});
+  this->mirror({mirror, {"kubelka_munk"}, "kubelka_munk: "});
 }
 
 void ProfileParser::mirror(const Object& entry) {
@@ -317,9 +315,7 @@ void ProfileParser::appearance(const Object& entry, Material& material) {
     proper = value.has_value();
     if (value) material.rgba[channel] = static_cast<std::uint8_t>(*value);
   }
-  if (!proper)
-    problem(entry, entry.has("rgba") ? "rgba" : "",
-            "rgba must be four whole numbers from 0 to 255");
+  if (!proper) problem(entry, "rgba", "rgba must be four whole numbers from 0 to 255");
   if (!entry.has("linear_rgb")) return;
   material.linear_rgb = numbers(entry["linear_rgb"], 0, 1);
   if (!material.linear_rgb)

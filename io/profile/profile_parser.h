@@ -12,7 +12,7 @@ namespace vdbdither {
 
 /// Something wrong with a printer profile.
 struct ProfileProblem {
-  std::string pointer;  ///< JSON pointer (RFC 6901) to the value or key
+  std::vector<std::string> path;  ///< keys and indices that lead to it
   std::string message;
 };
 
@@ -30,8 +30,8 @@ class ProfileParser {
   /// An object of the profile.
   struct Object {
     const Json& json;
-    std::string pointer;  ///< to it
-    std::string prefix;   ///< of messages, such as "material 1: "
+    std::vector<std::string> path;  ///< to it
+    std::string prefix;             ///< of messages, such as "material 1: "
 
     [[nodiscard]] bool has(const std::string& key) const { return json.contains(key); }
     [[nodiscard]] const Json& operator[](const std::string& key) const { return json.at(key); }
