@@ -45,10 +45,12 @@ CheckedProfile checkedProfile(const std::string& text,
                               const std::optional<std::string>& stem = std::nullopt) {
   if (std::string problem = jsonSyntaxProblem(text); !problem.empty())
     return {{}, {std::move(problem)}};
-  const ProfileParser parser(parsedJson(text));
+  const ordered_json json = parsedJson(text);
+  const ProfileParser parser(json);
   std::vector<ProfileProblem> problems = parser.problems();
   const std::string& name = parser.profile().name;
-  if (stem && !name.empty() && name != *stem)
+  const bool is_named = json.is_object() && json.contains("name") && json["name"].is_string();
+  if (stem && is_named && name != *stem)
     problems.push_back({{"name"}, "its name '" + name + "' is not that of its file"});
   const JsonLines lines = jsonLines(text);
   std::vector<std::pair<int, std::string>> by_line;

@@ -117,10 +117,9 @@ std::string ProfileParser::text(const Object& object, const std::string& key) {
 
 std::string ProfileParser::name(const Object& object) {
   std::string name = text(object, "name");
-  if (name.empty()) {
-    if (!object.has("name") || object["name"].is_string())
-      problem(object, "name", "there is no name");
-  } else if (const auto wrong = fileNameProblem(name)) {
+  if (!object.has("name")) {
+    problem(object, "name", "there is no name");
+  } else if (const auto wrong = fileNameProblem(name); wrong && !name.empty()) {
     problem(object, "name", "its name " + *wrong);
   }
   return name;
@@ -285,6 +284,7 @@ void ProfileParser::material(const Object& entry) {
   known(entry,
         {"name", "rgba", "linear_rgb", "absorption", "scattering", "density_g_per_cm3", "resin"});
   material.name = name(entry);
+  if (entry.has("name") && entry["name"] == "") problem(entry, "name", "there is no name");
   material.resin = text(entry, "resin");
   appearance(entry, material);
   if (entry.has("density_g_per_cm3")) {

@@ -65,7 +65,7 @@ class Manual(ProgramTest):
         self.assertEqual(self.completed("dither", "--disp"), ["--displaced"])
         self.assertEqual(self.completed("read", "a.vdb", "!", "dither", "--at", ""),
                          ["closest", "foot", "voxel"])
-        self.assertEqual(self.completed("mesh2sdf", "part.stl", "--printer", "mim"), ["mimaki-3duj-553"])
+        self.assertEqual(self.completed("mesh2sdf", "part.stl", "--printer", "longer"), ["longer-orange-4k"])
         self.assertEqual(self.completed("help", "prin"), ["printers"])
         (self.folder / "part.stl").touch()
         self.assertEqual(self.completed("mesh2sdf", "par"), ["part.stl"])

@@ -81,6 +81,12 @@ TEST(PrinterProfile, RefusesWrongFieldsOfSlices) {
                   "containers must be a list of different names");
 }
 
+TEST(PrinterProfile, MayHaveNoNameInMetadata) {
+  EXPECT_EQ(printerProfileFromJson(R"({"name": "", "pitch_mm": [1, 1, 1]})").name, "");
+  EXPECT_THAT([] { printerProfileFromJson(R"({"pitch_mm": [1, 1, 1]})"); },
+              testing::ThrowsMessage<DataError>(HasSubstr(": there is no name")));
+}
+
 TEST(PrinterProfile, RefusesLayersOutOfTheirRange) {
   for (const char* range : {"[0.01]", "[0, 0.1]", "[0.01, 101]", "0.05", R"(["a", 1])"})
     expectRefused(R"("layer_mm": )" + std::string(range),
@@ -99,6 +105,8 @@ TEST(PrinterProfile, RefusesWrongFieldsOfMaterials) {
     expectRefused(material(R"("density_g_per_cm3": )" + std::string(density)),
                   "material 1: density_g_per_cm3 must be a number above 0, up to 100");
   expectRefused(material(R"("resin": 1)"), "material 1: resin is no text");
+  expectRefused(R"("materials": [{"name": "", "rgba": [0, 0, 0, 255]}])",
+                "material 1: there is no name");
 }
 
 }  // namespace
