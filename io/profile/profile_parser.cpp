@@ -284,7 +284,8 @@ void ProfileParser::material(const Object& entry) {
   known(entry,
         {"name", "rgba", "linear_rgb", "absorption", "scattering", "density_g_per_cm3", "resin"});
   material.name = name(entry);
-  if (entry.has("name") && entry["name"] == "") problem(entry, "name", "there is no name");
+  if (material.name.empty() && entry.has("name") && entry["name"].is_string())
+    problem(entry, "name", "there is no name");
   material.resin = text(entry, "resin");
   appearance(entry, material);
   if (entry.has("density_g_per_cm3")) {

@@ -258,7 +258,7 @@ class ImageStacks(ProgramTest):
         self.refuse_import("--edited: 'out' has no manifest.json; leave it out", *PITCH, "--edited", code=2)
         self.succeed("slice-import", "out", *MIMAKI, "-o", "x.vdb")
         self.succeed("material-assign", "-i", "x.vdb", "!", "slice-export", "stack")
-        for options in (PITCH, MIMAKI, ("--materials", "palette"), ("--background", "white"), ("--flip-x",), ("--flip-y",)):
+        for options in (PITCH, MIMAKI, ("--layer", "50um"), ("--materials", "palette"), ("--background", "white"), ("--flip-x",), ("--flip-y",)):
             self.refuse(2, f"{options[0]}: the manifest.json of 'stack' states it; leave it out", "slice-import", "stack", *options, "-o", "y.vdb")
 
     def test_what_holds_no_images_is_refused(self):
