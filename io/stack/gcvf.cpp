@@ -23,6 +23,7 @@ namespace {
 
 constexpr const char* configuration_name = "ConfigFile.xml";
 constexpr double inch_mm = 25.4;
+constexpr int most_dpi = 65535;
 constexpr double nanometre_mm = 1e-6;
 const SliceNames gcvf_names{"layer_", 1, 0};
 
@@ -159,7 +160,8 @@ class ConfigurationReader : public XmlReader {
 
   [[nodiscard]] ContainerContents contents() const {
     ContainerContents contents;
-    contents.pitch_mm = {inch_mm / number("XDpi", 1, 1e6), inch_mm / number("YDpi", 1, 1e6),
+    contents.pitch_mm = {inch_mm / number("XDpi", 1, most_dpi),
+                         inch_mm / number("YDpi", 1, most_dpi),
                          number("SliceThicknessNanoMeter", 1, 1e9) * nanometre_mm};
     constexpr double most = 1 << 24;
     contents.width = std::lround(number("SliceWidth", 1, most));

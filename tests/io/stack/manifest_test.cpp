@@ -182,6 +182,21 @@ std::string refusal(const std::string& text, EditedStack edited = EditedStack::r
   return "";
 }
 
+TEST(Manifest, StatesTheFrameWhereSlicesShowAnotherBox) {
+  Manifest manifest = example();
+  manifest.layout.box = {Coord(-3, 0, 4), Coord(9, 0, 9)};
+  manifest.layout.padding = 0;
+  const std::string text = textOf(manifest);
+  EXPECT_THAT(text, HasSubstr("\"frame\""));
+  const test::ScratchFolder scratch;
+  scratch.write("manifest.json", text);
+  const Manifest read =
+      readManifest(StackInput(scratch.path()), EditedStack::refused, [](const std::string&) {});
+  EXPECT_EQ(read.layout.box, manifest.layout.box);
+  EXPECT_EQ(read.lattice.box, example().lattice.box);
+  EXPECT_EQ(textOf(example()).find("frame"), std::string::npos);
+}
+
 TEST(Manifest, HasOneText) { EXPECT_EQ(textOf(example()), example_text); }
 
 TEST(Manifest, MayBeWrittenAnewByAnotherProgram) {
