@@ -43,19 +43,24 @@ DescribedStack describedBy(const ContainerContents& contents, const StackInput& 
   manifest.format = contents.format;
   manifest.grid = contents.materials.empty() ? solid_grid : material_grid;
   manifest.lattice.pitch_mm = contents.pitch_mm;
-  manifest.lattice.box = {
-      {0, 0, 0},
-      {static_cast<int>(contents.width) - 1, static_cast<int>(contents.height) - 1,
-       static_cast<int>(contents.layers) - 1}};
+  manifest.lattice.origin_mm = contents.origin_mm;
+  const openvdb::Coord size(static_cast<int>(contents.width), static_cast<int>(contents.height),
+                            static_cast<int>(contents.layers));
+  manifest.lattice.box = {contents.corner, contents.corner + size - openvdb::Coord(1, 1, 1)};
   manifest.layout = {manifest.lattice.box, 0, contents.flip_x, contents.flip_y};
   manifest.background = contents.background;
   manifest.materials = contents.materials;
   manifest.layers = manifest.lattice.layers();
-  for (int layer = 0; layer < manifest.layers.end; ++layer) {
-    const std::string name = contents.file_name(layer);
-    if (const auto problem = relativePathProblem(name))
-      throw DataError(contents.shown + ": the name of the slice '" + name + "' " + *problem);
-    manifest.slices.push_back({layer, name, "", ""});
+  const bool has_file_each = findSliceFormat(contents.format)->pixel == SlicePixel::one_material;
+  const std::size_t files_of_layer = has_file_each ? contents.materials.size() : 1;
+  for (int layer = 0; layer < manifest.layers.size(); ++layer) {
+    for (std::size_t i = 0; i < files_of_layer; ++i) {
+      const std::string name = contents.file_name(layer, i);
+      if (const auto problem = relativePathProblem(name))
+        throw DataError(contents.shown + ": the name of the slice '" + name + "' " + *problem);
+      manifest.slices.push_back({manifest.layers.begin + layer, name, "",
+                                 has_file_each ? contents.materials[i].name : ""});
+    }
   }
   return {contents.configuration, std::move(manifest)};
 }

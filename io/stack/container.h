@@ -20,6 +20,8 @@ struct ContainerContents {
   std::string configuration;  ///< the name of the file that says so
   std::string shown;          ///< the same for messages, in quotes
   openvdb::Vec3d pitch_mm;
+  openvdb::Vec3d origin_mm{0.0};   ///< of the lattice
+  openvdb::Coord corner{0, 0, 0};  ///< the voxel of the slices with the least coordinates
   std::int64_t width = 0;
   std::int64_t height = 0;
   std::int64_t layers = 0;
@@ -27,11 +29,12 @@ struct ContainerContents {
   bool flip_y = false;
   std::array<std::uint8_t, 4> background{0, 0, 0, 255};
   MaterialTable materials;
-  std::function<std::string(int layer)> file_name;
+  /// The name of the slice of a layer, from 0, and of a material, for formats with a file for each.
+  std::function<std::string(int layer, std::size_t material)> file_name;
 };
 
-/// Returns the same as a stack: voxel (0, 0, 0) is at one end of each axis of the first slice.
-/// Throws DataError for a size or pitch that no container has, and for more layers than `files`.
+/// Returns the same as a stack. Throws DataError for a size or pitch that no container has, and for
+/// more layers than `files`.
 DescribedStack describedBy(const ContainerContents& contents, const StackInput& files);
 
 /// The most bytes of a file that describes a container.

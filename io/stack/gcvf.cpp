@@ -12,6 +12,7 @@
 #include "io/image/png_spans.h"
 #include "io/stack/container.h"
 #include "io/stack/slice_format.h"
+#include "io/stack/xml_text.h"
 #include "vdbdither/engine/option_values.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/printable.h"
@@ -30,27 +31,6 @@ const SliceNames gcvf_names{"layer_", 1, 0};
 /// The dots per inch that are nearest to a pitch: printers state these, and pitches in mm are
 /// rounded.
 int dpiOf(double pitch_mm) { return static_cast<int>(std::lround(inch_mm / pitch_mm)); }
-
-/// `text` within XML.
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char c : printable(text)) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      default:
-        result += c;
-    }
-  }
-  return result;
-}
 
 std::string channels(const std::array<std::uint8_t, 4>& colour) {
   std::string text;
@@ -144,7 +124,7 @@ class GcvfSlices : public SliceEncoder {
         << channels(stack.background) << "</BackGroundMaterialRGBA>\n";
     for (std::size_t i = 0; i < stack.materials.size(); ++i) {
       const Material& material = stack.materials[i];
-      xml << "    <Material>\n      <Name>" << escaped(resinOf(material, printer))
+      xml << "    <Material>\n      <Name>" << xmlText(resinOf(material, printer))
           << "</Name>\n      <RGBA>" << channels(material.rgba) << "</RGBA>\n      <VoxelCount>"
           << stack.voxels[i] << "</VoxelCount>\n    </Material>\n";
     }
@@ -168,7 +148,7 @@ class ConfigurationReader : public XmlReader {
     contents.height = std::lround(number("SliceHeight", 1, most));
     contents.layers = std::lround(number("NumberOfSlices", 1, most));
     const int first = static_cast<int>(number("StartIndex", 0, most));
-    contents.file_name = [first, prefix = text("ImageFilePrefix")](int layer) {
+    contents.file_name = [first, prefix = text("ImageFilePrefix")](int layer, std::size_t) {
       return prefix + std::to_string(first + layer) + ".png";
     };
     contents.background = colour(text("BackGroundMaterialRGBA"));

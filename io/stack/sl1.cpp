@@ -108,7 +108,7 @@ std::optional<DescribedStack> describeSl1(const StackInput& files) {
   contents.flip_x = slicer.find("display_mirror_x") == "1";
   contents.flip_y = slicer.find("display_mirror_y") == "1";
   contents.materials = resinTable();
-  contents.file_name = [prefix = job.text("jobDir")](int layer) {
+  contents.file_name = [prefix = job.text("jobDir")](int layer, std::size_t /*material*/) {
     return prefix + zeroPadded(layer, number_digits) + ".png";
   };
   return describedBy(contents, files);

@@ -114,7 +114,9 @@ std::optional<DescribedStack> describeUvj(const StackInput& files) {
   contents.flip_x = flag("/Properties/Mirror/X");
   contents.flip_y = flag("/Properties/Mirror/Y");
   contents.materials = resinTable();
-  contents.file_name = [](int layer) { return folder + zeroPadded(layer, number_digits) + ".png"; };
+  contents.file_name = [](int layer, std::size_t /*material*/) {
+    return folder + zeroPadded(layer, number_digits) + ".png";
+  };
   return describedBy(contents, files);
 }
 

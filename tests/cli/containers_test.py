@@ -35,8 +35,9 @@ class Containers(ProgramTest):
         run("mesh2sdf", "part.stl", "--printer", "stratasys-j750-27um", "!", "dither", "!", "material-assign", "--core", "VeroCyan", "--shell",
             "0.3mm:white", "-o", "jetted.vdb")
         run("mesh2sdf", "part.stl", "--printer", "small.json", "!", "dither", "-o", "cured.vdb")
-        for name in ("a.gcvf", "plain.zip"):
+        for name in ("a.gcvf", "plain.zip", "level.3mf"):
             run("slice-export", "-i", "jetted.vdb", name)
+        run("slice-export", "-i", "jetted.vdb", "mesh.3mf", "--3mf-mesh", "part.stl")
         run("slice-export", "-i", "jetted.vdb", "--format", "objet", "bits")
         for name in ("a.sl1", "a.uvj"):
             run("slice-export", "-i", "cured.vdb", name)
@@ -164,8 +165,63 @@ class Containers(ProgramTest):
         self.assertEqual(names, {"config.json", "preview/tiny.png", "preview/huge.png", *slices})
         self.check_display(*self.slices("a.uvj", slices))
 
+    def test_a_3mf_holds_a_volume_in_a_mesh_or_a_level_set(self):
+        core, volumetric = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}", "{http://schemas.3mf.io/3dmanufacturing/volumetric/2022/01}"
+        manifest, plain = self.plain("plain.zip")
+        for name, has_mesh in (("mesh.3mf", True), ("level.3mf", False)):
+            with zipfile.ZipFile(self.made / name) as files:
+                names = set(files.namelist())
+                model = xml.fromstring(files.read("3D/3dmodel.model"))
+                related = [entry.get("Target") for entry in xml.fromstring(files.read("3D/_rels/3dmodel.model.rels"))]
+                roots = [entry.get("Target") for entry in xml.fromstring(files.read("_rels/.rels"))]
+                types = {entry.get("Extension") for entry in xml.fromstring(files.read("[Content_Types].xml"))}
+            self.assertEqual(types, {"rels", "model", "png"})
+            self.assertEqual(roots, ["/3D/3dmodel.model", "/Metadata/thumbnail.png"])
+            self.assertEqual(model.get("requiredextensions"), None if has_mesh else "v")
+            ids = [element.get("id") for element in model.find(core + "resources")]
+            self.assertEqual(len(ids), len(set(ids)))
+            by_id = {element.get("id"): element for element in model.find(core + "resources")}
+            sheets = [sheet.get("path") for sheet in model.iter(volumetric + "imagesheet")]
+            self.assertEqual(sorted(sheets), sorted(related))
+            self.assertTrue(all(path.startswith("/") and path[1:] in names for path in sheets))
+            materials = list(model.iter(core + "base"))
+            mappings = list(model.iter(volumetric + "materialmapping"))
+            self.assertEqual(len(materials), len(mappings))
+            height, width = plain.shape[1:3]
+            shares = []
+            for mapping in mappings:
+                function = by_id[mapping.get("functionid")]
+                stack = by_id[function.get("image3did")].find(volumetric + "imagestack")
+                self.assertEqual([int(stack.get(f"{axis}count")) for axis in ("row", "column", "sheet")], [height, width, len(plain)])
+                mode, layers = self.slices(name, [sheet.get("path")[1:] for sheet in stack])
+                self.assertEqual(mode, "L")
+                shares.append(layers)
+            # Nowhere is the sum zero, and in a printed voxel it is one material.
+            self.assertTrue((sum(layers.astype(int) for layers in shares) > 0).all())
+            for material, layers in zip(manifest["materials"], shares):
+                self.assertTrue(((layers > 127) == (plain == material["rgba"]).all(axis=3)).all())
+            # The matrix takes the corners of the slices to 0 and 1.
+            matrix = numpy.array([float(number) for number in mappings[0].get("transform").split()]).reshape(4, 3)
+            pitch, low, high = (numpy.array(manifest[key] if key == "pitch_mm" else manifest["box"][key]) for key in ("pitch_mm", "min", "max"))
+            low[2] = manifest["first_layer"]
+            high[2] = low[2] + len(plain) - 1
+            for corner, expected in ((low - 0.5, 0), (high + 0.5, 1)):
+                self.assertTrue(numpy.allclose(corner * pitch @ matrix[:3] + matrix[3], expected, atol=1e-9))
+            item = by_id[model.find(f"{core}build/{core}item").get("objectid")]
+            if has_mesh:
+                self.assertIn(item.find(core + "mesh").get(volumetric + "volumeid"), by_id)
+                continue
+            level = item.find(volumetric + "levelset")
+            function = by_id[level.get("functionid")]
+            stack = by_id[function.get("image3did")].find(volumetric + "imagestack")
+            solid = self.slices(name, [sheet.get("path")[1:] for sheet in stack])[1] / 255
+            values = solid * float(function.get("valuescale")) + float(function.get("valueoffset"))
+            self.assertTrue(((values < 0) == (plain != (0, 0, 0, 255)).any(axis=3)).all())
+            box = numpy.array([[float(vertex.get(axis)) for axis in "xyz"] for vertex in by_id[level.get("meshid")].iter(core + "vertex")])
+            self.assertTrue(numpy.allclose(box.min(axis=0), (low - 0.5) * pitch) and numpy.allclose(box.max(axis=0), (high + 0.5) * pitch))
+
     def test_containers_come_back_voxel_for_voxel(self):
-        for container, source in (("a.gcvf", "jetted.vdb"), ("a.sl1", "cured.vdb"), ("a.uvj", "cured.vdb")):
+        for container, source in (("a.gcvf", "jetted.vdb"), ("mesh.3mf", "jetted.vdb"), ("level.3mf", "jetted.vdb"), ("a.sl1", "cured.vdb"), ("a.uvj", "cured.vdb")):
             back = self.folder / "back.vdb"
             self.succeed("slice-import", self.made / container, "-o", back, "--overwrite")
             counts = []

@@ -154,6 +154,76 @@ TEST_F(Containers, AUvjOfOthersIsReadAsItsConfigurationSays) {
                                   "slice-export"));
 }
 
+constexpr const char* volume_text = R"(<?xml version="1.0" encoding="UTF-8"?>
+<model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+  xmlns:v="http://schemas.3mf.io/3dmanufacturing/volumetric/2022/01"><resources>
+ <basematerials id="1"><base name="ink" displaycolor="#01020304"/>
+  <base name="glue" displaycolor="#aabbcc"/></basematerials>
+ <v:image3d id="2"><v:imagestack rowcount="2" columncount="3" sheetcount="2">
+  <v:imagesheet path="/a0.png"/><v:imagesheet path="/a1.png"/></v:imagestack></v:image3d>
+ <v:image3d id="4"><v:imagestack rowcount="2" columncount="3" sheetcount="2">
+  <v:imagesheet path="/b0.png"/><v:imagesheet path="/b1.png"/></v:imagestack></v:image3d>
+ <v:functionfromimage3d id="3" image3did="2"/><v:functionfromimage3d id="5" image3did="4"/>
+ <v:volumedata id="6"><v:composite basematerialid="1">
+  <v:materialmapping functionid="3" transform="2.5 0 0 0 5 0 0 0 10 0.25 -1 0" channel="red"/>
+  <v:materialmapping functionid="5" transform="2.5 0 0 0 5 0 0 0 10 0.25 -1 0" channel="red"/>
+ </v:composite></v:volumedata></resources></model>)";
+
+TEST_F(Containers, AVolumeOf3mfIsReadAsItsModelSays) {
+  std::filesystem::create_directories(scratch_ / "3D");
+  scratch_.write("3D/3dmodel.model", volume_text);
+  addSlices({"a0.png", "a1.png"}, rgba(200, 200, 200));
+  addSlices({"b0.png", "b1.png"}, rgba(100, 100, 100));
+  const StackReader reader(scratch_.path(), EditedStack::refused, [](const std::string&) {});
+  const Manifest& stack = reader.manifest();
+  EXPECT_TRUE(openvdb::math::isApproxEqual(stack.lattice.pitch_mm, {0.4 / 3, 0.1, 0.05}));
+  // The corner is at -0.1, 0.2 and 0 mm.
+  EXPECT_EQ(stack.lattice.box.min(), Coord(0, 3, 1));
+  EXPECT_NEAR(stack.lattice.position(stack.lattice.box.min()).x(), -0.1 + 0.2 / 3, 1e-12);
+  EXPECT_NEAR(stack.lattice.position(stack.lattice.box.min()).y(), 0.25, 1e-12);
+  EXPECT_NEAR(stack.lattice.position(stack.lattice.box.min()).z(), 0.025, 1e-12);
+  EXPECT_EQ(stack.materials[0].rgba, (std::array<std::uint8_t, 4>{1, 2, 3, 4}));
+  EXPECT_EQ(stack.materials[1].rgba, (std::array<std::uint8_t, 4>{0xaa, 0xbb, 0xcc, 255}));
+  EXPECT_TRUE(reader.layer(stack.layers.begin) ==
+              test::spanImage(3, 2, [](int x, int) { return x == 0; }));
+}
+
+TEST_F(Containers, AVolumeOf3mfThatContradictsItselfIsRefused) {
+  std::filesystem::create_directories(scratch_ / "3D");
+  addSlices({"a0.png", "a1.png", "b0.png", "b1.png"}, rgba(255, 255, 255));
+  const auto with = [&](const std::string& from, const std::string& to) {
+    scratch_.write("3D/3dmodel.model", replaced(volume_text, from, to));
+    return refusal();
+  };
+  const std::string ours =
+      "; slice-import reads volumes as slice-export writes them, an image for each material";
+  EXPECT_EQ(with("<base name=\"ink\" displaycolor=\"#01020304\"/>", ""),
+            "'3D/3dmodel.model': its composite does not map each material to a function" + ours);
+  EXPECT_EQ(with("functionid=\"5\"", "functionid=\"7\""),
+            "'3D/3dmodel.model': a material is not mapped to an image" + ours);
+  EXPECT_EQ(with("<v:imagesheet path=\"/b1.png\"/>", ""),
+            "'3D/3dmodel.model': an image has 1 sheets and not 2" + ours);
+  EXPECT_EQ(with("0.25 -1 0", "0.5 -1 0"),
+            "'3D/3dmodel.model': the images of its materials are not alike" + ours);
+  EXPECT_THAT(with("#01020304", "#0102030"),
+              testing::HasSubstr("has the colour '#0102030', which is not #RRGGBB or #RRGGBBAA"));
+  EXPECT_THAT(with("rowcount=\"2\"", "rowcount=\"-2\""),
+              testing::HasSubstr("has a rowcount '-2', which is no count"));
+  EXPECT_THAT(with("/a0.png", "a0.png"),
+              testing::HasSubstr("names a sheet 'a0.png', which must begin with '/'"));
+  EXPECT_THAT(with("/a0.png", "/../a0.png"),
+              testing::HasSubstr("the name of the slice '../a0.png'"));
+  EXPECT_THAT(with(" image3did=\"2\"", ""),
+              testing::HasSubstr("has a functionfromimage3d without image3did"));
+  std::string turned = volume_text;
+  for (int i = 0; i < 2; ++i) turned = replaced(turned, "2.5 0 0 0", "2.5 1 0 0");
+  scratch_.write("3D/3dmodel.model", turned);
+  EXPECT_THAT(refusal(), testing::HasSubstr("that does more than scale and shift"));
+  // Voxels of two materials.
+  scratch_.write("3D/3dmodel.model", volume_text);
+  EXPECT_THAT(refusal(), testing::HasSubstr("has voxels in row 0 that another material has"));
+}
+
 TEST(ContainerPitch, MustBeThatOfThePrinter) {
   PrinterProfile printer;
   printer.pitch_mm = {0.02, 0.04, 0.05};
