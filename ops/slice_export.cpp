@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -16,12 +17,14 @@
 #include "io/stack/slice_format.h"
 #include "io/stack/slice_frame.h"
 #include "io/stack/slice_spans.h"
+#include "io/stack/span_spool.h"
 #include "io/stack/stack_files.h"
 #include "io/stack/stack_writer.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
+#include "vdbdither/model/interrupt.h"
 #include "vdbdither/model/known_grids.h"
 #include "vdbdither/model/openvdb.h"
 #include "vdbdither/model/words.h"
@@ -82,13 +85,21 @@ class SliceExport : public Sink {
     planNames();
     StackOutput::check(folder_, overwrite_.overwrite,
                        [this](const std::string& text) { report().warn(text); });
-    const PrinterProfile printer = printerProfileOf(in);
-    planFrame(
-        frame_, *format_, printer, [this](const std::string& text) { report().warn(text); },
-        stack_);
-    checkPrinterTakes(*format_, printer, stack_);
-    minimum_layers_ = format_->showsColours() ? printer.minimum_slices : 0;
+    printer_ = printerProfileOf(in);
+    // Of a part that is cropped the place is not known yet.
+    const auto warn = [this](const std::string& text) {
+      if (!frame_.crop) report().warn(text);
+    };
+    planFrame(frame_, in.lattice.box, *format_, printer_, warn, stack_);
+    checkPrinterTakes(*format_, printer_, stack_);
+    minimum_layers_ = format_->showsColours() ? printer_.minimum_slices : 0;
     encoder_->plan(stack_, in.grids);
+    if (frame_.crop && !encoder_->reads().empty()) {
+      throw UsageError("--crop: " + format_name_ +
+                       " shows more than what is printed; leave it out, or take another format");
+    }
+    spool_.reset();
+    printed_ = {};
   }
 
   [[nodiscard]] OutputEstimate output() const override {
@@ -113,19 +124,24 @@ class SliceExport : public Sink {
   }
 
   void write(const Slab& in) override {
-    if (!writer_) writer_.emplace(folder_, stack_, names_, *encoder_, blankLayers());
-    checkWithin(in);
-    const int together =
-        leaf_layers * ((tbb::this_task_arena::max_concurrency() + leaf_layers - 1) / leaf_layers);
-    for (int z = in.core.begin; z < in.core.end;) {
-      const int end =
-          std::min(in.core.end, alignedToLeaves({z, z + together - leaf_layers + 1}).end);
-      writer_->add({z, end}, slices(in, {z, end}), in.grids);
-      z = end;
+    if (frame_.crop) {
+      if (!spool_) spool_.emplace(std::filesystem::path(folder_).parent_path());
+      if (spool_->size() == 0) first_kept_ = in.core.begin;
+    } else if (!writer_) {
+      writer_.emplace(folder_, stack_, names_, *encoder_, blankLayers());
+      checkWithin(in);
     }
+    inGroups(in.core, [&](ZRange layers) {
+      if (frame_.crop) {
+        for (const SpanImage& slice : slices(in, layers, wholeLayout())) keep(slice, layers);
+      } else {
+        writer_->add(layers, slices(in, layers, stack_.layout), in.grids);
+      }
+    });
   }
 
   void finish() override {
+    if (spool_) writeKept();
     if (!writer_) throw DataError("no layer came to slice");
     stack_ = writer_->finish();
     writer_.reset();
@@ -253,6 +269,63 @@ class SliceExport : public Sink {
     }
   }
 
+  /// Calls `work` for layers that all threads can work on together.
+  template <typename Work>
+  static void inGroups(ZRange all, const Work& work) {
+    const int together =
+        leaf_layers * ((tbb::this_task_arena::max_concurrency() + leaf_layers - 1) / leaf_layers);
+    for (int z = all.begin; z < all.end;) {
+      const int end = std::min(all.end, alignedToLeaves({z, z + together - leaf_layers + 1}).end);
+      work(ZRange{z, end});
+      z = end;
+    }
+  }
+
+  /// That of slices whose frame is not known yet.
+  [[nodiscard]] SliceLayout wholeLayout() const { return {schema_.lattice.box, 0, false, false}; }
+
+  /// Keeps a slice of the whole lattice, and grows the box of what is printed.
+  void keep(const SpanImage& slice, ZRange layers) {
+    spool_->add(slice);
+    const openvdb::CoordBBox& box = schema_.lattice.box;
+    for (std::uint32_t y = 0; y < slice.height; ++y) {
+      std::uint32_t begin = 0;
+      for (const Span& span : slice.row(y)) {
+        if (span.value != 0) {
+          const int row = box.max().y() - static_cast<int>(y);
+          printed_.expand(
+              openvdb::Coord(box.min().x() + static_cast<int>(begin), row, layers.begin));
+          printed_.expand(
+              openvdb::Coord(box.min().x() + static_cast<int>(span.end) - 1, row, layers.begin));
+        }
+        begin = span.end;
+      }
+    }
+  }
+
+  /// Writes the slices that were kept, in the frame of what is printed.
+  void writeKept() {
+    openvdb::CoordBBox part = schema_.lattice.box;
+    for (int axis = 0; axis < 2 && !printed_.empty(); ++axis) {
+      part.min()[axis] = printed_.min()[axis];
+      part.max()[axis] = printed_.max()[axis];
+    }
+    planFrame(
+        frame_, part, *format_, printer_, [this](const std::string& text) { report().warn(text); },
+        stack_);
+    encoder_->plan(stack_, schema_.grids);
+    writer_.emplace(folder_, stack_, names_, *encoder_, blankLayers());
+    inGroups({first_kept_, first_kept_ + static_cast<int>(spool_->size())}, [&](ZRange layers) {
+      throwIfInterrupted();
+      std::vector<SpanImage> kept;
+      for (int z = layers.begin; z < layers.end; ++z)
+        kept.push_back(spool_->read(static_cast<std::size_t>(z - first_kept_)));
+      writer_->add(
+          layers, sliceSpans(*gridOfSpans(kept, wholeLayout(), layers), stack_.layout, layers), {});
+    });
+    spool_.reset();
+  }
+
   [[nodiscard]] BlankLayers blankLayers() const {
     return {.keep = keep_blank_, .minimum_layers = minimum_layers_};
   }
@@ -273,12 +346,11 @@ class SliceExport : public Sink {
         "centred");
   }
 
-  [[nodiscard]] std::vector<SpanImage> slices(const Slab& in, ZRange layers) const {
+  [[nodiscard]] std::vector<SpanImage> slices(const Slab& in, ZRange layers,
+                                              const SliceLayout& layout) const {
     return stack_.grid == material_grid
-               ? sliceSpans(*findGrid<openvdb::Int32Grid>(in.grids, material_grid), stack_.layout,
-                            layers)
-               : sliceSpans(*findGrid<openvdb::BoolGrid>(in.grids, solid_grid), stack_.layout,
-                            layers);
+               ? sliceSpans(*findGrid<openvdb::Int32Grid>(in.grids, material_grid), layout, layers)
+               : sliceSpans(*findGrid<openvdb::BoolGrid>(in.grids, solid_grid), layout, layers);
   }
 
   std::string folder_;
@@ -287,6 +359,7 @@ class SliceExport : public Sink {
   SliceNames names_{"slice_", 5, 0};
   FrameOptions frame_;
   bool keep_blank_ = false;
+  PrinterProfile printer_;
   int minimum_layers_ = 0;
   std::string format_given_;
   std::string name_given_;
@@ -298,6 +371,9 @@ class SliceExport : public Sink {
   SliceEncoder* encoder_ = nullptr;
   Manifest stack_;
   std::optional<StackWriter> writer_;
+  std::optional<SpanSpool> spool_;  ///< slices whose frame is not known yet
+  int first_kept_ = 0;              ///< the layer of the first of these
+  openvdb::CoordBBox printed_;
 };
 
 }  // namespace

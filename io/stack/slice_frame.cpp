@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::array<Choice<Tray>, 4> trays{
     {{Tray::usual, "usual",
-      "For sl1 and uvj the display if the profile states its size, in the middle where the part "
-      "lies outside of it; for others the part alone"},
+      "For sl1 and uvj the display if the profile states its size, the part in the middle; for "
+      "others the part alone"},
      {Tray::none, "none", "The part alone"},
      {Tray::placed, "placed", "The whole display or tray, the part where its coordinates say"},
      {Tray::centred, "centred", "The whole display or tray, the part in the middle"}}};
@@ -44,9 +44,9 @@ bool liesWithin(const openvdb::CoordBBox& box, const openvdb::CoordBBox& frame, 
 }
 
 /// The tray in voxels of the lattice, the part where its coordinates say.
-openvdb::CoordBBox placedTray(const Lattice& lattice, const openvdb::Vec2i& size,
-                              const PrinterProfile& printer) {
-  openvdb::CoordBBox frame = lattice.box;
+openvdb::CoordBBox placedTray(const Lattice& lattice, const openvdb::CoordBBox& part,
+                              const openvdb::Vec2i& size, const PrinterProfile& printer) {
+  openvdb::CoordBBox frame = part;
   for (int axis = 0; axis < 2; ++axis) {
     const double first = -lattice.origin_mm[axis] / lattice.pitch_mm[axis] -
                          (printer.origin == "centre" ? size[axis] / 2 : 0);
@@ -57,11 +57,11 @@ openvdb::CoordBBox placedTray(const Lattice& lattice, const openvdb::Vec2i& size
 }
 
 /// The same, the part in the middle.
-openvdb::CoordBBox centredTray(const Lattice& lattice, const openvdb::Vec2i& size) {
-  openvdb::CoordBBox frame = lattice.box;
+openvdb::CoordBBox centredTray(const openvdb::CoordBBox& part, const openvdb::Vec2i& size) {
+  openvdb::CoordBBox frame = part;
   for (int axis = 0; axis < 2; ++axis) {
-    const int empty = size[axis] - lattice.box.dim()[axis];
-    frame.min()[axis] = lattice.box.min()[axis] - static_cast<int>(std::floor(empty / 2.0));
+    const int empty = size[axis] - part.dim()[axis];
+    frame.min()[axis] = part.min()[axis] - static_cast<int>(std::floor(empty / 2.0));
     frame.max()[axis] = frame.min()[axis] + size[axis] - 1;
   }
   return frame;
@@ -76,29 +76,28 @@ std::string lengths(const openvdb::Vec2i& size, const openvdb::Vec3d& pitch_mm) 
 }
 
 openvdb::CoordBBox trayBox(Tray tray, const PrinterProfile& printer, const Lattice& lattice,
-                           const openvdb::Vec2i& size,
-                           const std::function<void(const std::string&)>& warn) {
-  const openvdb::Coord part = lattice.box.dim();
+                           const openvdb::CoordBBox& box, const openvdb::Vec2i& size) {
+  const openvdb::Coord part = box.dim();
   if (part.x() > size.x() + 2 * empty_voxels || part.y() > size.y() + 2 * empty_voxels) {
     throw UsageError("--tray: the part needs " + lengths({part.x(), part.y()}, lattice.pitch_mm) +
                      ", and the printer has " + lengths(size, lattice.pitch_mm) +
                      "; turn it with mesh2sdf --rotate, or make it smaller with --fit");
   }
-  const openvdb::CoordBBox placed = placedTray(lattice, size, printer);
-  if (tray != Tray::centred && liesWithin(lattice.box, placed, empty_voxels)) return placed;
-  if (tray == Tray::placed) {
+  if (tray != Tray::placed) return centredTray(box, size);
+  const openvdb::CoordBBox placed = placedTray(lattice, box, size, printer);
+  if (!liesWithin(box, placed, empty_voxels)) {
     throw UsageError(
         "--tray: by its coordinates the part lies outside of the display or tray, whose " +
         printer.origin + " is at x = y = 0; give --tray centred");
   }
-  if (tray == Tray::usual)
-    warn("by its coordinates the part lies outside of the display; slices show it in the middle");
-  return centredTray(lattice, size);
+  return placed;
 }
 
 }  // namespace
 
 void FrameOptions::declare(Options& options) {
+  options.flag("crop", crop,
+               "Shows only what is printed; the slices are kept on the disk until all are known");
   options.choice("tray", tray, trays, "What slices show");
   options.length("margin", margin_mm, {0, 1000},
                  "Empty space added on each side in x and y, up to whole voxels");
@@ -110,12 +109,11 @@ void FrameOptions::declare(Options& options) {
   options.flag("flip-y", flip_y, "Mirrors top to bottom; by default the maximum y is the top row");
 }
 
-void planFrame(const FrameOptions& options, const SliceFormat& format,
-               const PrinterProfile& printer, const std::function<void(const std::string&)>& warn,
-               Manifest& stack) {
+void planFrame(const FrameOptions& options, const openvdb::CoordBBox& part,
+               const SliceFormat& format, const PrinterProfile& printer,
+               const std::function<void(const std::string&)>& warn, Manifest& stack) {
   SliceLayout& layout = stack.layout;
-  layout = {stack.lattice.box, options.padding,
-            options.flip_x != (format.shows_display && printer.mirror_x),
+  layout = {part, options.padding, options.flip_x != (format.shows_display && printer.mirror_x),
             options.flip_y != (format.shows_display && printer.mirror_y)};
   const std::optional<openvdb::Vec2i> size = traySize(printer);
   const bool is_asked = options.tray == Tray::placed || options.tray == Tray::centred;
@@ -130,7 +128,7 @@ void planFrame(const FrameOptions& options, const SliceFormat& format,
       throw UsageError(
           "--margin and --padding: the slices show the whole display or tray; leave "
           "them out, or give --tray none");
-    layout.box = trayBox(options.tray, printer, stack.lattice, *size, warn);
+    layout.box = trayBox(options.tray, printer, stack.lattice, part, *size);
   } else if (format.shows_display) {
     warn(std::string(format.name) +
          ": the slices show the part alone; the display is not known without a --printer");

@@ -14,8 +14,10 @@ namespace vdbdither {
 /// Which part of the display or tray of a printer slices show.
 enum class Tray { usual, none, placed, centred };
 
-/// `--tray`, `--margin`, `--padding` and `--flip-x`, `--flip-y`: what surrounds the part in slices.
+/// `--crop`, `--tray`, `--margin`, `--padding` and `--flip-x`, `--flip-y`: what surrounds the part
+/// in slices.
 struct FrameOptions {
+  bool crop = false;
   Tray tray = Tray::usual;
   double margin_mm = 0;
   int padding = 0;
@@ -26,12 +28,13 @@ struct FrameOptions {
 };
 
 /// Sets the layout of `stack`, whose lattice is known.
+/// @param part     the voxels to show: those of the lattice, or those that are printed
 /// @param printer  one that says nothing where there is none
-/// @param warn     told where the part lies, if that is not where its coordinates say
+/// @param warn     told where the display of a resin printer is not known
 /// Throws UsageError where the printer or the format has no room for the slices.
-void planFrame(const FrameOptions& options, const SliceFormat& format,
-               const PrinterProfile& printer, const std::function<void(const std::string&)>& warn,
-               Manifest& stack);
+void planFrame(const FrameOptions& options, const openvdb::CoordBBox& part,
+               const SliceFormat& format, const PrinterProfile& printer,
+               const std::function<void(const std::string&)>& warn, Manifest& stack);
 
 /// Checks that the printer takes a job with as many materials and layers, and that the voxels of a
 /// container are its own. Throws UsageError.

@@ -41,7 +41,7 @@ class Containers(ProgramTest):
         run("slice-export", "-i", "jetted.vdb", "--format", "objet", "bits")
         for name in ("a.sl1", "a.uvj"):
             run("slice-export", "-i", "cured.vdb", name)
-        run("slice-export", "-i", "cured.vdb", "--format", "png8", "--tray", "placed", "--flip-x", "display.zip")
+        run("slice-export", "-i", "cured.vdb", "--format", "png8", "--tray", "centred", "--flip-x", "display.zip")
 
     def slices(self, archive, names):
         """Returns the images as Pillow reads them, in one array of layers."""

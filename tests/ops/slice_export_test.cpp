@@ -99,6 +99,93 @@ TEST(SliceExport, SlicesAreSeenFromAboveInTheColoursOfTheMaterials) {
   EXPECT_TRUE(fs::exists(scratch / "out/slice_00001.png"));
 }
 
+TEST(SliceExport, CroppedSlicesShowWhatIsPrintedInAnyLayer) {
+  const test::ScratchFolder scratch;
+  Job job =
+      jobOf(drawnMaterial({{"......", "..1...", "......"}, {"......", "......", "...2.."}}, 4),
+            CoordBBox(Coord(-9, -5, 4), Coord(30, 8, 6)));
+  const auto slice = [&](const char* name, const std::vector<std::string>& options) {
+    std::vector<std::string> arguments{scratch / name, "--crop"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    Export(arguments).run(job);
+    return test::readPng(fileBytes(scratch / name / "slice_00000.png"));
+  };
+  const test::PngImage image = slice("plain", {});
+  EXPECT_EQ(image.width, 2U);
+  EXPECT_EQ(image.height, 2U);
+  EXPECT_THAT(image.rows, ElementsAre(240, 240, 240, 255, 0, 0, 0, 255,  //
+                                      0, 0, 0, 255, 0, 0, 0, 255));
+  const test::PngImage turned = slice("turned", {"--padding", "1", "--flip-x", "--flip-y"});
+  EXPECT_EQ(turned.width, 4U);
+  // The white voxel is in the third of four columns and rows.
+  EXPECT_EQ(turned.rows[4 * (2 * 4 + 2)], 240);
+  const auto manifest = nlohmann::json::parse(fileBytes(scratch / "plain/manifest.json"));
+  EXPECT_EQ(manifest["frame"]["min"], (std::vector<int>{2, 0}));
+  EXPECT_EQ(manifest["frame"]["max"], (std::vector<int>{3, 1}));
+  EXPECT_EQ(manifest["box"]["min"], (std::vector<int>{-9, -5, 4}));
+}
+
+TEST(SliceExport, CroppedSlicesOfLargePartsAreThoseOfTheWhole) {
+  const test::ScratchFolder scratch;
+  const Job job = largeJob();
+  Export({scratch / "whole"}).run(job);
+  Export({scratch / "crop", "--crop"}).run(job);
+  const auto manifest = nlohmann::json::parse(fileBytes(scratch / "crop/manifest.json"));
+  const int left = static_cast<int>(manifest["frame"]["min"][0]) + 20;
+  const int top = 30 - static_cast<int>(manifest["frame"]["max"][1]);
+  EXPECT_EQ(left, 16);
+  for (int i = 0; i < 29; ++i) {
+    const std::string name = "slice_000" + std::string(i < 10 ? "0" : "") + std::to_string(i);
+    const test::PngImage whole = test::readPng(fileBytes(scratch / "whole" / (name + ".png")));
+    const test::PngImage crop = test::readPng(fileBytes(scratch / "crop" / (name + ".png")));
+    for (std::uint32_t y = 0; y < crop.height; ++y) {
+      for (std::uint32_t x = 0; x < 4 * crop.width; ++x) {
+        ASSERT_EQ(crop.rows[y * 4 * crop.width + x],
+                  whole.rows[(y + top) * 4 * whole.width + 4 * left + x]);
+      }
+    }
+  }
+}
+
+TEST(SliceExport, ExrIsNotCropped) {
+  const test::ScratchFolder scratch;
+  Job job = smallJob();
+  job.schema.grids["surface"] = openvdb::FloatGrid::create(1);
+  EXPECT_THAT(
+      [&] {
+        Export({scratch / "out", "--format", "exr", "--crop"}).sink().plan(job.schema);
+      },
+      ThrowsMessage<UsageError>("--crop: exr shows more than what is printed; leave it out, or "
+                                "take another format"));
+}
+
+TEST(SliceExport, APartThatReachesBeyondTheTrayIsRefused) {
+  const test::ScratchFolder scratch;
+  Job job = jobOf(drawnMaterial({{"1....."}}, 4), CoordBBox(Coord(-9, -5, 4), Coord(3, 4, 4)));
+  job.schema.metadata["vdbdither:printer"] =
+      R"({"name":"p","pitch_mm":[0.042,0.084,0.022],"slice_px":[8,8],"materials":[]})";
+  EXPECT_NO_THROW(Export({scratch / "in", "--tray", "placed"}).run(job));
+  job.grids["material"] = drawnMaterial({{"1........2"}}, 4);
+  EXPECT_THAT(
+      [&] {
+        Export({scratch / "out", "--tray", "placed"}).run(job);
+      },
+      ThrowsMessage<DataError>("the part reaches beyond the display or tray; make it "
+                               "smaller, or give --tray centred"));
+}
+
+TEST(SliceExport, AJobForAPrinterHasItsMinimumOfSlices) {
+  const test::ScratchFolder scratch;
+  Job job = jobOf(drawnMaterial({{"1"}, {"1"}}, 4), CoordBBox(Coord(0, 0, 0), Coord(0, 0, 40)));
+  job.schema.metadata["vdbdither:printer"] =
+      R"({"name":"p","pitch_mm":[0.042,0.084,0.022],"minimum_slices":30,"materials":[]})";
+  Export({scratch / "out"}).run(job);
+  const auto manifest = nlohmann::json::parse(fileBytes(scratch / "out/manifest.json"));
+  EXPECT_EQ(manifest["size"][2], 30);
+  EXPECT_EQ(manifest["first_layer"], 4);
+  EXPECT_EQ(manifest["cropped"]["above"], 7);
+}
+
 TEST(SliceExport, NamesOrientationPaddingAndBackgroundAreOptions) {
   const test::ScratchFolder scratch;
   Export({scratch / "out", "--prefix", "p", "--digits", "1", "--first", "9", "--flip-x", "--flip-y",

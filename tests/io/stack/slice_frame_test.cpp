@@ -37,7 +37,7 @@ Planned planned(const CoordBBox& part, const FrameOptions& options, const char* 
   stack.lattice = {{0.02, 0.04, 0.05}, {0, 0, 0}, part};
   Planned result;
   planFrame(
-      options, *findSliceFormat(format), printer,
+      options, part, *findSliceFormat(format), printer,
       [&](const std::string& text) { result.warnings.push_back(text); }, stack);
   result.layout = stack.layout;
   return result;
@@ -72,17 +72,12 @@ TEST(SliceFrame, ATrayHasThePartWhereItsCoordinatesSayOrInTheMiddle) {
 
 TEST(SliceFrame, DisplaysAreShownWholeAndMirroredByTheirFormats) {
   const Planned shown = planned(part, {}, "sl1", display());
-  EXPECT_EQ(shown.layout.box, CoordBBox(Coord(0, 0, -3), Coord(99, 59, 8)));
+  EXPECT_EQ(shown.layout.box, CoordBBox(Coord(-30, -15, -3), Coord(69, 44, 8)));
   EXPECT_TRUE(shown.layout.flip_x);
   EXPECT_FALSE(shown.layout.flip_y);
   EXPECT_THAT(shown.warnings, IsEmpty());
   EXPECT_FALSE(planned(part, {.flip_x = true}, "uvj", display()).layout.flip_x);
 
-  const Planned outside =
-      planned(CoordBBox(Coord(-90, 10, 0), Coord(-71, 19, 8)), {}, "sl1", display());
-  EXPECT_EQ(outside.layout.box, CoordBBox(Coord(-130, -15, 0), Coord(-31, 44, 8)));
-  EXPECT_THAT(outside.warnings, ElementsAre("by its coordinates the part lies outside of the "
-                                            "display; slices show it in the middle"));
   const Planned unknown = planned(part, {}, "sl1", {});
   EXPECT_EQ(unknown.layout.box, part);
   EXPECT_THAT(unknown.warnings, ElementsAre("sl1: the slices show the part alone; the display is "
