@@ -165,16 +165,14 @@ class SliceExport : public Sink {
   void planFormat() {
     const SliceFormat* container = sliceFormatOfContainer(folder_);
     if (format_given_.empty() && container != nullptr) format_name_ = container->name;
-    format_ = findSliceFormat(format_name_);
-    if (container != format_ && (container != nullptr || !format_->container_ending.empty())) {
-      throw UsageError(
-          "--format: the name of " +
-          (container != nullptr ? "a " + std::string(container->name) : "a " + format_name_) +
-          " ends with " +
-          std::string(container != nullptr ? container->container_ending
-                                           : format_->container_ending) +
-          ", that of other stacks does not; it is '" + folder_ + "'");
+    const SliceFormat& format = *findSliceFormat(format_name_);
+    if (container != nullptr ? container != &format : !format.container_ending.empty()) {
+      const SliceFormat& named = container != nullptr ? *container : format;
+      throw UsageError("--format: the name of a " + std::string(named.name) + " ends with " +
+                       std::string(named.container_ending) +
+                       ", that of other stacks does not; it is '" + folder_ + "'");
     }
+    format_ = &format;
     if (format_->names != nullptr) {
       if (!name_given_.empty()) {
         throw UsageError(name_given_ + ": " + format_name_ +
