@@ -1,6 +1,9 @@
 #include "io/stack/resin_slices.h"
 
 #include "io/image/png_spans.h"
+#include "io/stack/grey_slice.h"
+#include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -12,18 +15,38 @@ void ResinSlices::declare(Options& options) {
                  "The same of the lowest layers");
   options.integer(format_ + "-bottom-layers", bottom_layers_, {0, 1000},
                   "How many layers these are");
+  options.flag(format_ + "-grey", grey_,
+               "Writes the share of each voxel that lies within the surface as a grey level, in "
+               "place of the dither; needs normals");
+  options.number(format_ + "-dose", dose_, {1.01, 1000},
+                 "Dose of a full pixel over the least that hardens, for grey levels along the "
+                 "working curve of the resin; in proportion to the shares without it");
+  options.onlyIf([this] { return grey_; });
 }
 
 void ResinSlices::plan(const Manifest& stack, const Grids& grids) {
   SliceEncoder::plan(stack, grids);
   printer_ = printerOf(stack);
   checkPitch(format_, stack, printer_);
+  if (grey_ && (!grids.contains(surface_grid) || !grids.contains(normal_grid))) {
+    throw UsageError("--" + format_ +
+                     "-grey: needs the grids 'surface' and 'N'; put normals before");
+  }
+}
+
+std::vector<std::string> ResinSlices::reads() const {
+  return grey_ ? std::vector<std::string>{surface_grid, normal_grid} : std::vector<std::string>{};
 }
 
 std::vector<SliceFile> ResinSlices::encode(const SliceLayer& layer) const {
+  const std::string name = folder_ + layer.name + ".png";
+  if (grey_) {
+    const SpanImage levels = greySlice(layer, stack().layout, pitchMm(), dose_);
+    return {{name, "", encodePng(levels, {PngPixels::grey8, {}})}};
+  }
   std::vector<std::uint32_t> grey(stack().materials.size() + 1, 255);
   grey[0] = 0;
-  return {{folder_ + layer.name + ".png", "", encodePng(layer.image, {PngPixels::grey8, grey})}};
+  return {{name, "", encodePng(layer.image, {PngPixels::grey8, grey})}};
 }
 
 }  // namespace vdbdither

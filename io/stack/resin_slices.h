@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,7 +10,8 @@
 
 namespace vdbdither {
 
-/// Slices for printers that light a resin through a display: 255 where it hardens, else 0.
+/// Slices for printers that light a resin through a display: 255 where it hardens, else 0. Or grey
+/// levels, see greySlice.
 class ResinSlices : public SliceEncoder {
  public:
   /// @param folder  of the slices within the container, with a '/' at its end
@@ -18,6 +20,9 @@ class ResinSlices : public SliceEncoder {
 
   void declare(Options& options) override;
   void plan(const Manifest& stack, const Grids& grids) override;
+  [[nodiscard]] std::vector<std::string> reads() const override;
+  /// A print that began with a blank layer would not stick to its plate.
+  [[nodiscard]] bool keepsBlank() const override { return false; }
   [[nodiscard]] std::vector<SliceFile> encode(const SliceLayer& layer) const override;
 
  protected:
@@ -33,6 +38,8 @@ class ResinSlices : public SliceEncoder {
   double exposure_s_ = 2.5;
   double bottom_exposure_s_ = 30;
   int bottom_layers_ = 5;
+  bool grey_ = false;
+  std::optional<double> dose_;
 };
 
 /// The resin of the slices of a container.

@@ -76,6 +76,9 @@ class SliceEncoder {
   /// Returns the names of the grids that it reads besides the sliced one. Asked after `plan`.
   [[nodiscard]] virtual std::vector<std::string> reads() const { return {}; }
 
+  /// Whether layers without a printed voxel say something all the same. Asked after `plan`.
+  [[nodiscard]] virtual bool keepsBlank() const { return !reads().empty(); }
+
   /// Returns the files of a layer. Safe to call from many threads. Throws DataError.
   [[nodiscard]] virtual std::vector<SliceFile> encode(const SliceLayer& layer) const = 0;
 

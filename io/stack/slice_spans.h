@@ -20,6 +20,17 @@ struct SliceLayout {
 
   [[nodiscard]] std::uint32_t width() const { return box.dim().x() + 2 * padding; }
   [[nodiscard]] std::uint32_t height() const { return box.dim().y() + 2 * padding; }
+  /// Whether the voxel is in its box along x and y.
+  [[nodiscard]] bool shows(const openvdb::Coord& voxel) const {
+    return voxel.x() >= box.min().x() && voxel.x() <= box.max().x() && voxel.y() >= box.min().y() &&
+           voxel.y() <= box.max().y();
+  }
+  [[nodiscard]] std::uint32_t columnOf(int x) const {
+    return static_cast<std::uint32_t>(padding + (flip_x ? box.max().x() - x : x - box.min().x()));
+  }
+  [[nodiscard]] std::uint32_t rowOf(int y) const {
+    return static_cast<std::uint32_t>(padding + (flip_y ? y - box.min().y() : box.max().y() - y));
+  }
 };
 
 /// The layers of `grid` as spans of its values, one picture per layer of `layers`. The tree is

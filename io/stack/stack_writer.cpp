@@ -44,7 +44,7 @@ StackWriter::StackWriter(const std::filesystem::path& target, Manifest stack, Sl
       preview_(stack_.lattice.pitch_mm, stack_.layout.width(), stack_.layout.height(),
                stack_.lattice.layers(), displayColours(stack_.materials)) {
   stack_.voxels.assign(stack_.materials.size(), 0);
-  if (!encoder.reads().empty()) blank_.keep = true;
+  if (encoder.keepsBlank()) blank_.keep = true;
 }
 
 void StackWriter::add(ZRange layers, std::vector<SpanImage> images, const Grids& grids) {

@@ -21,7 +21,7 @@ class StackWriter {
  public:
   /// @param stack    all but its layers, slices and voxels
   /// @param encoder  planned with the same; must outlive the writer
-  /// @param blank    all are kept also where no layer has a voxel or the encoder reads other grids
+  /// @param blank    all are kept also where no layer has a voxel or the encoder keeps them
   /// Throws DataError.
   StackWriter(const std::filesystem::path& target, Manifest stack, SliceNames names,
               const SliceEncoder& encoder, BlankLayers blank);

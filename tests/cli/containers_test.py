@@ -150,6 +150,18 @@ class Containers(ProgramTest):
         for name, size in thumbnails.items():
             self.assertEqual("x".join(map(str, self.slices("a.sl1", [name])[1].shape[2:0:-1])), size)
 
+    def test_grey_levels_are_the_shares_of_the_voxels(self):
+        self.run_program("mesh2sdf", self.made / "part.stl", "--printer", self.made / "small.json", "!", "normals", "!", "dither", "-o", "n.vdb")
+        self.succeed("slice-export", "-i", "n.vdb", "grey.sl1", "--sl1-grey")
+        _, layers = self.slices(self.folder / "grey.sl1", [f"slice{i:05}.png" for i in range(10)])
+        self.assertGreater(len(set(numpy.unique(layers))), 2)
+        # The sides of the box lie within voxels: the area of a layer is that of its levels.
+        for layer in layers[2:8]:
+            self.assertAlmostEqual(layer.sum() / 255 * 0.05 * 0.08, SIZE_MM[0] * SIZE_MM[1], delta=0.003)
+        done = self.run_program("slice-export", "-i", self.made / "cured.vdb", "no.sl1", "--sl1-grey")
+        self.assertEqual(done.stderr.decode(), "vdbdither slice-export: --sl1-grey: needs the grids 'surface' and 'N'; put normals before\n")
+        self.assertEqual(done.returncode, 2)
+
     def test_a_uvj_holds_what_its_readers_read(self):
         with zipfile.ZipFile(self.made / "a.uvj") as files:
             config = json.loads(files.read("config.json"))

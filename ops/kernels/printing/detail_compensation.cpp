@@ -26,7 +26,7 @@
 #include "ops/kernels/leaf/voxel_diameter.h"
 #include "ops/kernels/printing/blur_quantile.h"
 #include "ops/kernels/printing/gaussian_spread.h"
-#include "ops/kernels/printing/half_space_share.h"
+#include "vdbdither/model/half_space_share.h"
 
 namespace vdbdither {
 

@@ -1,4 +1,4 @@
-#include "ops/kernels/printing/half_space_share.h"
+#include "vdbdither/model/half_space_share.h"
 
 #include <random>
 

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <optional>
+
+#include "io/stack/slice_format.h"
+
+namespace vdbdither {
+
+/// Returns the grey levels of a layer, 0 … 255: the share of each voxel that lies within the
+/// surface, exact where that is a plane, out of the grids `surface` and `N`. Voxels farther away
+/// are full where they are printed.
+///
+/// @param layout  that of the slices
+/// @param dose    what a full pixel is lit with, over the least that hardens: the level of a share
+/// s
+///                is then 255 · dose^(s − 1), so that the resin hardens to the same share of the
+///                layer's depth. Levels rise in proportion without it.
+///
+/// Source: Jacobs: Rapid Prototyping & Manufacturing, SME 1992, the working curve: the depth of
+/// cure rises with the logarithm of the dose.
+SpanImage greySlice(const SliceLayer& layer, const SliceLayout& layout,
+                    const openvdb::Vec3d& pitch_mm, std::optional<double> dose);
+
+}  // namespace vdbdither
