@@ -15,6 +15,7 @@
 #include "io/stack/slice_format.h"
 #include "io/stack/slice_spans.h"
 #include "io/stack/stack_files.h"
+#include "io/stack/stack_page.h"
 #include "io/stack/stack_writer.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
@@ -57,6 +58,8 @@ class SliceExport : public Sink {
                  "Colour of empty voxels in " + sliceFormatNames([](const auto& format) {
                    return format.showsColours();
                  }) + ": #rrggbb, or r,g,b,a from 0 to 255");
+    options.file("page", page_name_, "FILE.html",
+                 "Writes a page to look through the slices too, as preview does");
     for (const SliceFormat* format : sliceFormats()) encoders_[format]->declare(options);
     overwrite_.declare(options, "the stack");
   }
@@ -78,6 +81,7 @@ class SliceExport : public Sink {
       throw UsageError("slices would be more than 16777216 voxels wide");
     }
     encoder_->plan(stack_, in.grids);
+    if (!page_name_.empty()) StackPage::check(page_name_, overwrite_.overwrite);
   }
 
   [[nodiscard]] OutputEstimate output() const override {
@@ -102,13 +106,21 @@ class SliceExport : public Sink {
   }
 
   void write(const Slab& in) override {
-    if (!writer_) writer_.emplace(folder_, stack_, names_, *encoder_, keep_blank_);
+    if (!writer_) {
+      writer_.emplace(folder_, stack_, names_, *encoder_, keep_blank_);
+      if (!page_name_.empty()) page_.emplace(schema_.lattice.layers(), pageStack(folder_, stack_));
+    }
     const int together =
         leaf_layers * ((tbb::this_task_arena::max_concurrency() + leaf_layers - 1) / leaf_layers);
     for (int z = in.core.begin; z < in.core.end;) {
       const int end =
           std::min(in.core.end, alignedToLeaves({z, z + together - leaf_layers + 1}).end);
-      writer_->add({z, end}, slices(in, {z, end}), in.grids);
+      std::vector<SpanImage> images = slices(in, {z, end});
+      std::vector<SpanImage> shown;
+      if (page_) shown = images;
+      writer_->add({z, end}, std::move(images), in.grids);
+      for (int layer = z; layer < end && page_; ++layer)
+        page_->add(layer, {std::move(shown[static_cast<std::size_t>(layer - z)])});
       z = end;
     }
   }
@@ -117,6 +129,11 @@ class SliceExport : public Sink {
     if (!writer_) throw DataError("no layer came to slice");
     stack_ = writer_->finish();
     writer_.reset();
+    if (page_) {
+      page_->finish(page_name_);
+      if (const std::string text = page_->warning(); !text.empty()) report().warn(text);
+      page_.reset();
+    }
     // Some layers of a job may well be empty.
     const std::vector<std::uint64_t>& voxels = stack_.voxels;
     if (stack_.layers == schema_.lattice.layers() &&
@@ -230,6 +247,7 @@ class SliceExport : public Sink {
   std::string background_ = "0,0,0,255";
   SliceNames names_{"slice_", 5, 0};
   bool keep_blank_ = false;
+  std::string page_name_;
   OverwriteOption overwrite_;
   std::map<const SliceFormat*, std::unique_ptr<SliceEncoder>> encoders_;
 
@@ -238,6 +256,7 @@ class SliceExport : public Sink {
   SliceEncoder* encoder_ = nullptr;
   Manifest stack_;
   std::optional<StackWriter> writer_;
+  std::optional<StackPage> page_;
 };
 
 }  // namespace
