@@ -46,8 +46,8 @@ class Preview : public Tool {
       const ZRange known = other->manifest().knownLayers();
       layers = {std::min(layers.begin, known.begin), std::max(layers.end, known.end)};
     }
-    StackPage page(layers, pageStack(stack_, shown.manifest()),
-                   other ? std::optional(pageStack(against_, other->manifest())) : std::nullopt);
+    StackPage page(layers, shownStack(stack_, shown),
+                   other ? std::optional(shownStack(against_, *other)) : std::nullopt);
     const int together = tbb::this_task_arena::max_concurrency();
     for (int begin = layers.begin; begin < layers.end; begin += together) {
       report().progress(static_cast<double>(begin - layers.begin) / layers.size());
@@ -66,6 +66,13 @@ class Preview : public Tool {
   }
 
  private:
+  static PageStack shownStack(const std::string& path, const StackReader& reader) {
+    PageStack stack = pageStack(path, reader.manifest());
+    if (reader.format().pixel == SlicePixel::printed && stack.manifest.materials.size() > 1)
+      stack.manifest.materials = {{"printed", {240, 240, 240, 255}}};
+    return stack;
+  }
+
   /// Beside the stack: out.html for out, out.zip and out/manifest.json.
   [[nodiscard]] std::filesystem::path defaultPage() const {
     std::filesystem::path path = std::filesystem::path(stack_).lexically_normal();

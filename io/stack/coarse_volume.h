@@ -18,9 +18,9 @@ class CoarseVolume {
 
   /// @param size      of the stack in voxels
   /// @param pitch_mm  of the voxels
-  /// @param values    greatest value of a pixel
+  /// @param colours   of the values of pixels from 1 on
   CoarseVolume(const std::array<std::uint32_t, 3>& size, const openvdb::Vec3d& pitch_mm,
-               std::uint32_t values);
+               std::vector<std::array<std::uint8_t, 4>> colours);
 
   /// Adds layer `z`, counted from 0. Layers come in rising order; missing ones are empty.
   void add(std::uint32_t z, const SpanImage& slice);
@@ -28,22 +28,32 @@ class CoarseVolume {
   [[nodiscard]] double cellMm() const { return cell_mm_; }
   [[nodiscard]] const std::array<std::uint32_t, 3>& cells() const { return cells_; }
 
-  /// Returns two bytes' planes, one after the other; x runs fastest, then the rows, top row first,
-  /// then the layers: the share of a cell that is not 0, in steps of 17 from 0 to 255, and the
-  /// value that most of it has besides 0. Ends the gathering.
+  /// Blocks of two cubes along each axis, which have a colour.
+  [[nodiscard]] std::array<std::uint32_t, 3> blocks() const {
+    return {(cells_[0] + 1) / 2, (cells_[1] + 1) / 2, (cells_[2] + 1) / 2};
+  }
+
+  /// Returns three fields of bytes, in each of which x runs fastest, then the rows, top row first,
+  /// then the layers: the share of a cube that is not 0, in steps of 17 from 0 to 255; the value
+  /// that most of it has besides 0; and of each block red, green and blue: the mean of what is not
+  /// 0, as light of a gamma of 2, and 0 only where there is nothing. Ends the gathering.
   [[nodiscard]] std::vector<std::uint8_t> finish();
 
  private:
   void endCellLayer();
+  void endBlockLayer();
 
-  std::uint32_t values_;
+  std::vector<std::array<std::uint8_t, 4>> colours_;
+  std::size_t values_;
   double cell_mm_;
   std::array<std::uint32_t, 3> cells_;
   std::array<std::vector<std::uint32_t>, 3> cell_of_;  ///< of each column, row and layer
   std::array<std::vector<std::uint32_t>, 3> begin_;    ///< of each cell and after the last
   std::uint32_t layer_ = 0;                            ///< of cells, which is gathered
   std::vector<std::uint32_t> counts_;                  ///< of its cells and values
-  std::vector<std::uint8_t> share_, value_;
+  /// Of the blocks that are gathered: sums of the squares of red, green and blue, and of voxels.
+  std::vector<std::array<std::uint64_t, 4>> light_;
+  std::vector<std::uint8_t> share_, value_, colour_;
 };
 
 }  // namespace vdbdither

@@ -11,6 +11,7 @@
 #include "io/file/staged_output.h"
 #include "io/stack/viewer_page.h"
 #include "vdbdither/engine/json_text.h"
+#include "vdbdither/engine/option_values.h"
 #include "vdbdither/engine/version.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/words.h"
@@ -103,6 +104,12 @@ void countVoxels(const SpanImage& image, std::vector<std::uint64_t>& voxels) {
   }
 }
 
+std::vector<std::array<std::uint8_t, 4>> coloursOf(const MaterialTable& materials) {
+  std::vector<std::array<std::uint8_t, 4>> colours;
+  for (const Material& material : materials) colours.push_back(material.rgba);
+  return colours;
+}
+
 }  // namespace
 
 PageStack pageStack(const std::filesystem::path& path, const Manifest& manifest) {
@@ -123,8 +130,7 @@ StackPage::StackPage(ZRange layers, PageStack shown, std::optional<PageStack> ot
       most_bytes_(most_bytes),
       frame_(frameOf(shown, other)),
       volume_(sizeOf(frame_, layers), shown.manifest.lattice.pitch_mm,
-              static_cast<std::uint32_t>(shown.manifest.materials.size() +
-                                         (other ? other->manifest.materials.size() : 0))),
+              coloursOf(shown.manifest.materials)),
       next_(layers.begin) {
   if (other && (other->manifest.lattice.pitch_mm != shown.manifest.lattice.pitch_mm ||
                 other->manifest.lattice.origin_mm != shown.manifest.lattice.origin_mm)) {
@@ -260,8 +266,8 @@ void StackPage::thinOut() {
 std::string StackPage::warning() const {
   if (stride_ == 1) return "";
   return "the page shows one slice of " + std::to_string(stride_) +
-         ": with all of them it would take more than " + std::to_string(most_bytes_ / 1'000'000) +
-         " MB";
+         ": with all of them it would take more than " +
+         shortestText(static_cast<double>(most_bytes_) / 1e6) + " MB";
 }
 
 std::string StackPage::description() const {
@@ -296,7 +302,8 @@ std::string StackPage::description() const {
       entry.push_back({group.left, group.top, group.width, group.height});
     json["groups"].push_back(std::move(entry));
   }
-  json["volume"] = {{"cell_mm", volume_.cellMm()}, {"cells", volume_.cells()}};
+  json["volume"] = {
+      {"cell_mm", volume_.cellMm()}, {"cells", volume_.cells()}, {"blocks", volume_.blocks()}};
   std::string text;
   // Nothing in the text may end the element that holds it.
   for (const char c : jsonText(json)) text += c == '<' ? std::string("\\u003c") : std::string(1, c);

@@ -218,6 +218,8 @@ async function start() {
 // For tests, and for those who write their own scripts around the page.
 window.viewer = {
   page, state, setSlice, setCursor, setMode, setMaterial, setMain, setZoom, setTheme, showVoxels, showAll,
+  // Whether the sections show all that is in sight as it is.
+  sectionsRead: () => sections.known.every((known) => known === 1),
   // The pixel of a canvas at the middle of a voxel: of its column and its row, or its slice.
   pixelOf: (name, across, along) => {
     const view = views[name];

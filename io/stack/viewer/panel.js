@@ -11,7 +11,7 @@ function element(tag, text, name) {
 const grouped = (count) => count.toLocaleString("en").replaceAll(",", "\u202f");
 const millilitres = (count) => {
   const ml = count * dx * dy * dz / 1000;
-  return ml === 0 ? "0" : ml < 0.001 ? ml.toExponential(1) : ml.toPrecision(4);
+  return ml === 0 ? "0" : ml < 0.001 ? ml.toExponential(1) : ml < 1 ? ml.toPrecision(3) : ml.toPrecision(4);
 };
 const mm = (length) => length.toFixed(3);
 

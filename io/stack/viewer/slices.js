@@ -104,12 +104,12 @@ function countsOf([now, before]) {
   return { counts, difference };
 }
 
-// The volume of cubes that the page holds: share and value of each.
+// The volume of cubes that the page holds: share and value of each, and the colours of blocks of eight.
 const cells = page.volume.cells;
 let volume = null;
 const volumeReady = inflated(bytesOf("volume")).then((bytes) => {
   const count = cells[0] * cells[1] * cells[2];
-  volume = { share: bytes.subarray(0, count), value: bytes.subarray(count) };
+  volume = { share: bytes.subarray(0, count), value: bytes.subarray(count, 2 * count), colour: bytes.subarray(2 * count) };
 });
 
 // Lines of the slices through the cursor: along x for the front, along y for the side. They are read while nobody waits.

@@ -165,7 +165,7 @@ class SliceView extends FlatView {
     const power = 10 ** Math.floor(Math.log10(most_mm));
     const length = [5, 2, 1].find((digit) => digit * power <= most_mm) * power;
     const scale = $("scale");
-    scale.style.width = `${length * this.scale * this.canvas.clientWidth / this.canvas.width}px`;
+    scale.firstElementChild.style.width = `${length * this.scale * this.canvas.clientWidth / this.canvas.width}px`;
     scale.firstElementChild.textContent = length < 1 ? `${+(length * 1000).toPrecision(1)} µm` : `${length} mm`;
   }
   pick([u, v]) {
