@@ -110,13 +110,16 @@ class Browser(Pages):
         self.wait_for("const {slice, mode} = document.querySelector('#view-xy canvas').dataset;"
                       "return Number(slice) === viewer.state.slice && mode === viewer.state.mode")
 
-    def pixel(self, across, along, view="xy"):
-        """Returns the colour in a voxel, beside the lines through its middle."""
+    def pixels(self, places, view="xy"):
+        """Returns the colours in voxels, beside the lines through their middle."""
         self.settle()
-        return tuple(self.run_script(
-            "const [x, y] = viewer.pixelOf(arguments[0], arguments[1], arguments[2]);"
-            "return [...document.querySelector(`#view-${arguments[0]} canvas`).getContext('2d').getImageData(x, y, 1, 1).data].slice(0, 3)",
-            view, across - 0.3, along - 0.3))
+        return [tuple(colour) for colour in self.run_script(
+            "const context = document.querySelector(`#view-${arguments[0]} canvas`).getContext('2d');"
+            "return arguments[1].map((place) => [...context.getImageData(...viewer.pixelOf(arguments[0], ...place), 1, 1).data].slice(0, 3))",
+            view, [(across - 0.3, along - 0.3) for across, along in places])]
+
+    def pixel(self, across, along):
+        return self.pixels([(across, along)])[0]
 
     def press(self, key):
         self.browser.switch_to.active_element.send_keys(key)
@@ -129,10 +132,10 @@ class Browser(Pages):
         self.assertEqual(said, [])
         self.assertEqual(self.run_script("return performance.getEntriesByType('resource').map((entry) => entry.name)"), [])
 
-    def check_slice(self, expected):
-        for y, row in enumerate(expected):
-            for x, colour in enumerate(row):
-                self.assertEqual(self.pixel(x, y), colour, (x, y))
+    def check_view(self, expected, view="xy"):
+        """Checks the colours of a view, which are given row by row."""
+        places = [(x, y) for y, row in enumerate(expected) for x in range(len(row))]
+        self.assertEqual(self.pixels(places, view), [colour for row in expected for colour in row])
 
     def test_voxels_have_the_colours_of_their_materials_and_differences(self):
         self.make_stack("out", SLICES)
@@ -143,24 +146,21 @@ class Browser(Pages):
         self.run_script("viewer.setTheme('light'); viewer.setSlice(0)")
         for z, rows in enumerate(SLICES):
             self.run_script("viewer.setSlice(arguments[0])", z)
-            self.check_slice([[colours[letter] for letter in row] for row in rows])
+            self.check_view([[colours[letter] for letter in row] for row in rows])
         self.run_script("viewer.setSlice(1); viewer.setCursor(2, 1)")
         # The front shows row 1 of every slice, the highest at the top; the side shows column 2, its last row first.
         self.wait_for("return viewer.sectionsRead()")
-        for line, z in enumerate((2, 1, 0)):
-            for x in range(4):
-                self.assertEqual(self.pixel(x, line, "xz"), colours[SLICES[z][1][x]], (x, z))
-            for y in range(3):
-                self.assertEqual(self.pixel(2 - y, line, "yz"), colours[SLICES[z][y][2]], (y, z))
+        self.check_view([[colours[letter] for letter in rows[1]] for rows in reversed(SLICES)], "xz")
+        self.check_view([[colours[row[2]] for row in reversed(rows)] for rows in reversed(SLICES)], "yz")
 
         self.run_script("viewer.setMode('below')")
-        self.check_slice([[SAME, SAME, SAME, SAME], [SAME, REMOVED, ADDED, STAGE["light"]], [SAME, SAME, CHANGED, SAME]])
+        self.check_view([[SAME, SAME, SAME, SAME], [SAME, REMOVED, ADDED, STAGE["light"]], [SAME, SAME, CHANGED, SAME]])
         shown = self.run_script("return [...document.querySelectorAll('#difference tbody tr')].map((row) => row.cells[1].textContent)")
         self.assertEqual(shown, ["1", "1", "1"])
         self.run_script("viewer.setMode('against')")
-        self.check_slice([[CHANGED] * 4, [SAME, REMOVED, CHANGED, REMOVED], [SAME] * 4])
+        self.check_view([[CHANGED] * 4, [SAME, REMOVED, CHANGED, REMOVED], [SAME] * 4])
         self.run_script("viewer.setMode('other')")
-        self.check_slice([[colours[letter] for letter in row] for row in ("GGRR", "RRRR", "BBRB")])
+        self.check_view([[colours[letter] for letter in row] for row in ("GGRR", "RRRR", "BBRB")])
 
         self.run_script("viewer.setMode('materials'); viewer.setSlice(0)")
         self.press("1")
@@ -221,7 +221,7 @@ class Browser(Pages):
             self.press("t")
             self.assertEqual(self.run_script("return document.documentElement.dataset.theme"), theme)
             self.run_script("viewer.showAll()")
-            self.assertEqual(self.pixel(2, 30), STAGE[theme])
+            self.assertEqual(self.pixel(-2, 1), STAGE[theme])
         for main in ("xz", "yz", "solid", "xy"):
             self.press("v")
             self.assertEqual(self.run_script("return document.querySelector('.view.main').id"), f"view-{main}")

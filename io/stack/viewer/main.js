@@ -218,8 +218,9 @@ async function start() {
 // For tests, and for those who write their own scripts around the page.
 window.viewer = {
   page, state, setSlice, setCursor, setMode, setMaterial, setMain, setZoom, setTheme, showVoxels, showAll,
-  // Whether the sections show all that is in sight as it is.
-  sectionsRead: () => sections.known.every((known) => known === 1),
+  // Whether the sections show every slice as it is at the cursor.
+  sectionsRead: () => state.cursor.every((place, axis) => place === sections.cursor[axis]) && sections.known.every(Boolean) &&
+      [front, side].every((view) => view.picture && view.picture.reading === sections.readings),
   // The pixel of a canvas at the middle of a voxel: of its column and its row, or its slice.
   pixelOf: (name, across, along) => {
     const view = views[name];
