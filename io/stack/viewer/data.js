@@ -134,7 +134,8 @@ function cropped(plane, from, to) {
   return result;
 }
 
-async function unpackGroup(stack, index, first) {
+// `rest` is awaited now and then. Throws what it throws.
+async function unpackGroup(stack, index, first, rest = pause) {
   const crop = new Crop(page.groups[index][1 + stack]);
   const group = { crop, planes: [], bytes: 0 };
   if (crop.width === 0) {
@@ -153,7 +154,7 @@ async function unpackGroup(stack, index, first) {
     group.bytes += crop.size;
     before = plane;
     if (performance.now() - since > 12) {
-      await pause();
+      await rest();
       since = performance.now();
     }
   }

@@ -142,31 +142,39 @@ const sections = {
     const wanted = [];
     for (let i = Math.floor(begin / SLICES_OF_GROUP); i * SLICES_OF_GROUP < end; ++i) if (!this.known[i]) wanted.push(i);
     wanted.sort((a, b) => Math.abs(a - present) - Math.abs(b - present));
+    // Slices that are asked for go first.
+    const rest = async () => {
+      do await pause(); while (sliceView.isBusy());
+      if (run !== this.run) throw STOPPED;
+    };
     let told = performance.now();
-    for (const index of wanted) {
-      const kept = cache.get(`${this.stack}-${index}`);
-      const group = kept && kept.group ? kept.group
-          : this.stack === 0 ? await unpackGroup(0, index) : await groupOf(this.stack, index);
-      if (run !== this.run) return;
-      this.take(index, group);
-      if (performance.now() - told > 250) {
-        done();
-        await pause();
+    try {
+      for (const index of wanted) {
+        await rest();
+        const kept = cache.get(`${this.stack}-${index}`);
+        const group = kept && kept.group ? kept.group
+            : this.stack === 0 ? await unpackGroup(0, index, null, rest) : await groupOf(this.stack, index);
         if (run !== this.run) return;
-        told = performance.now();
+        this.take(index, group);
+        if (performance.now() - told > 400) {
+          done();
+          told = performance.now();
+        }
       }
+    } catch (reason) {
+      if (reason !== STOPPED) throw reason;
+      return;
     }
     if (wanted.length) done();
   },
 };
+const STOPPED = Symbol("stopped");
 
 // A section as a picture: exact where its lines are known, else from the volume. Top row: the highest slice of the range.
-function sectionPicture(axis, begin, end) {
+// A pixel stands for `across` columns and `along` slices.
+function sectionPicture(axis, begin, end, across, along) {
   const length = axis === "front" ? width : height;
-  const rows = end - begin;
-  const step = Math.max(1, Math.ceil(Math.sqrt(length * rows / MOST_PIXELS)));
-  const columns = Math.ceil(length / step), lines = Math.ceil(rows / step);
-  if (columns < 1 || lines < 1) return null;
+  const columns = Math.ceil(length / across), lines = Math.ceil((end - begin) / along);
   const canvas = new OffscreenCanvas(columns, lines);
   const context = canvas.getContext("2d");
   const image = context.createImageData(columns, lines);
@@ -174,10 +182,10 @@ function sectionPicture(axis, begin, end) {
   const colours = palette();
   const source = axis === "front" ? sections.front : sections.side;
   // Seen from the right, the first column is the row of the least y.
-  const places = Int32Array.from({ length: columns }, (_, column) => axis === "front" ? column * step : height - 1 - column * step);
+  const places = Int32Array.from({ length: columns }, (_, column) => axis === "front" ? column * across : height - 1 - column * across);
   const coarse = coarseColumns(axis, places);
   for (let line = 0, to = 0; line < lines; ++line) {
-    const slice = end - 1 - line * step;
+    const slice = end - 1 - line * along;
     const known = sections.known[Math.floor(slice / SLICES_OF_GROUP)];
     const layer = Math.min(Math.floor((slice + 0.5) * thickness / page.volume.cell_mm), cells[2] - 1) * cells[0] * cells[1];
     for (let column = 0; column < columns; ++column, ++to) {
@@ -186,7 +194,7 @@ function sectionPicture(axis, begin, end) {
     }
   }
   context.putImageData(image, 0, 0);
-  return { canvas, step };
+  return canvas;
 }
 
 // For each place along a section, its cell in a layer of the volume.

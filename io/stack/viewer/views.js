@@ -72,12 +72,12 @@ class FlatView {
     return { left: Math.floor(u0 / this.pitch[0]), top: Math.floor(v0 / this.pitch[1]),
              right: Math.ceil(u1 / this.pitch[0]), bottom: Math.ceil(v1 / this.pitch[1]) };
   }
-  // Draws a picture whose pixels are `step` voxels, from column `left` and row `top` on.
-  drawPicture(picture, left, top, step) {
+  // Draws a picture whose pixels are `across` by `along` voxels, from column `left` and row `top` on.
+  drawPicture(picture, left, top, across, along) {
     const { context, pitch } = this;
     const [x, y] = this.toCanvas(left * pitch[0], top * pitch[1]);
-    const w = picture.width * step * pitch[0] * this.scale, h = picture.height * step * pitch[1] * this.scale;
-    context.imageSmoothingEnabled = this.scale * Math.min(...pitch) * step < 1;
+    const w = picture.width * across * pitch[0] * this.scale, h = picture.height * along * pitch[1] * this.scale;
+    context.imageSmoothingEnabled = this.scale * Math.min(pitch[0] * across, pitch[1] * along) < 1;
     context.imageSmoothingQuality = "high";
     context.drawImage(picture, x, y, w, h);
   }
@@ -138,8 +138,11 @@ class SliceView extends FlatView {
   async changed() {
     const run = ++this.run;
     const number = state.slice;
+    this.asked = performance.now();
+    this.waits = true;
     const slices = await shownSlices(number);
     if (run !== this.run) return;
+    this.waits = false;
     this.slices = slices;
     this.picture = pictureOf(slices, this.sight());
     this.draw();
@@ -148,6 +151,10 @@ class SliceView extends FlatView {
     showCounts(number, countsOf(slices));
     showReadout();
   }
+  // Whether somebody is looking through the slices.
+  isBusy() {
+    return this.waits || performance.now() - this.asked < 300;
+  }
   moved() {
     if (this.picture && !this.picture.whole) this.picture = pictureOf(this.slices, this.sight());
     this.draw();
@@ -155,7 +162,7 @@ class SliceView extends FlatView {
   draw() {
     this.clear();
     const { picture } = this;
-    if (picture && picture.canvas) this.drawPicture(picture.canvas, picture.left, picture.top, picture.step);
+    if (picture && picture.canvas) this.drawPicture(picture.canvas, picture.left, picture.top, picture.step, picture.step);
     this.drawGrid();
     this.drawCursor((state.cursor[0] + 0.5) * dx, (state.cursor[1] + 0.5) * dy);
     this.drawScale();
@@ -195,18 +202,21 @@ class SectionView extends FlatView {
   draw() {
     sections.reset(state.mode === "other" ? 1 : 0);
     const [begin, end] = this.range();
-    const covered = this.picture && this.picture.begin <= begin && this.picture.end >= end;
-    if (!covered || this.picture.reading !== sections.readings) {
-      this.picture = { begin, end, reading: sections.readings, made: end > begin ? sectionPicture(this.axis, begin, end) : null };
+    // Two pixels of the picture for one of the canvas, where voxels are that small.
+    const [across, along] = this.pitch.map((pitch) => Math.max(1, Math.floor(0.5 / (pitch * this.scale))));
+    const { picture } = this;
+    const covered = picture && picture.begin <= begin && picture.end >= end;
+    if (!covered || picture.reading !== sections.readings || picture.across !== across || picture.along !== along) {
+      const made = end > begin ? sectionPicture(this.axis, begin, end, across, along) : null;
+      this.picture = { begin, end, across, along, reading: sections.readings, made };
       if (!covered) readSections();
     }
     this.clear();
     const count = Math.round(this.extent[1] / thickness);
-    if (this.picture.made)
-      this.drawPicture(this.picture.made.canvas, 0, count - this.picture.end, this.picture.made.step);
+    if (this.picture.made) this.drawPicture(this.picture.made, 0, count - this.picture.end, across, along);
     this.drawGrid();
-    const along = this.axis === "front" ? (state.cursor[0] + 0.5) * dx : (height - state.cursor[1] - 0.5) * dy;
-    this.drawCursor(along, this.extent[1] - (state.slice + 0.5) * thickness);
+    const place = this.axis === "front" ? (state.cursor[0] + 0.5) * dx : (height - state.cursor[1] - 0.5) * dy;
+    this.drawCursor(place, this.extent[1] - (state.slice + 0.5) * thickness);
   }
   pick([u, v]) {
     if (this.axis === "front") setCursor(u / dx, state.cursor[1]);
