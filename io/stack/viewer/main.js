@@ -218,9 +218,11 @@ async function start() {
 // For tests, and for those who write their own scripts around the page.
 window.viewer = {
   page, state, setSlice, setCursor, setMode, setMaterial, setMain, setZoom, setTheme, showVoxels, showAll,
-  // Whether the sections show every slice as it is at the cursor.
-  sectionsRead: () => state.cursor.every((place, axis) => place === sections.cursor[axis]) && sections.known.every(Boolean) &&
-      [front, side].every((view) => view.picture && view.picture.reading === sections.readings),
+  // Whether the sections show what is in sight as it is at the cursor.
+  sectionsRead: () => state.cursor.every((place, axis) => place === sections.cursor[axis]) && [front, side].every((view) => {
+    const [begin, end] = view.range().map((slice) => slice / SLICES_OF_GROUP);
+    return view.picture && view.picture.reading === sections.readings && sections.known.slice(begin, Math.ceil(end)).every(Boolean);
+  }),
   // The pixel of a canvas at the middle of a voxel: of its column and its row, or its slice.
   pixelOf: (name, across, along) => {
     const view = views[name];

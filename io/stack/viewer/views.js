@@ -202,8 +202,8 @@ class SectionView extends FlatView {
   draw() {
     sections.reset(state.mode === "other" ? 1 : 0);
     const [begin, end] = this.range();
-    // Two pixels of the picture for one of the canvas, where voxels are that small.
-    const [across, along] = this.pitch.map((pitch) => Math.max(1, Math.floor(0.5 / (pitch * this.scale))));
+    // Four pixels of the picture for one of the canvas, where voxels are that small.
+    const [across, along] = this.pitch.map((pitch) => Math.max(1, Math.floor(0.25 / (pitch * this.scale))));
     const { picture } = this;
     const covered = picture && picture.begin <= begin && picture.end >= end;
     if (!covered || picture.reading !== sections.readings || picture.across !== across || picture.along !== along) {
