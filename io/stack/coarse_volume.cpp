@@ -95,7 +95,7 @@ void CoarseVolume::endBlockLayer() {
       }
       const double square = static_cast<double>(light[channel]) / static_cast<double>(light[3]);
       // Steps that nobody sees would not be compressed.
-      const int level = static_cast<int>(std::sqrt(square) + 0.5) & ~3;
+      const int level = static_cast<int>(std::lround(std::sqrt(square))) & ~3;
       colour_.push_back(static_cast<std::uint8_t>(std::max(level, 4)));
     }
     light = {};
