@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <filesystem>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -81,7 +83,7 @@ class SliceExport : public Sink {
       throw UsageError("slices would be more than 16777216 voxels wide");
     }
     encoder_->plan(stack_, in.grids);
-    if (!page_name_.empty()) StackPage::check(page_name_, overwrite_.overwrite);
+    planPage();
   }
 
   [[nodiscard]] OutputEstimate output() const override {
@@ -185,6 +187,17 @@ class SliceExport : public Sink {
           "needs a grid 'material' or 'solid'; put dither, and material-assign where there are "
           "materials, before it");
     }
+  }
+
+  void planPage() const {
+    if (page_name_.empty()) return;
+    const std::filesystem::path folder =
+        std::filesystem::absolute(folder_ + "/").lexically_normal();
+    const std::filesystem::path page = std::filesystem::absolute(page_name_).lexically_normal();
+    if (std::mismatch(folder.begin(), std::prev(folder.end()), page.begin(), page.end()).first ==
+        std::prev(folder.end()))
+      throw UsageError("--page: '" + page_name_ + "' lies in the stack, which holds slices only");
+    StackPage::check(page_name_, overwrite_.overwrite);
   }
 
   /// Names of files come from the prefix, and of folders from the materials.

@@ -63,6 +63,8 @@ class Files(Pages):
                     "preview", "out", "--against", "finer")
         self.refuse(1, "no such file or folder", "preview", "nothing")
         self.refuse(2, "'page.htm' must end in .html", "slice-import", "out", "!", "slice-export", "again", "--page", "page.htm")
+        self.refuse(2, "--page: './out/page.html' lies in the stack, which holds slices only",
+                    "slice-import", "finer", "!", "slice-export", "out", "--page", "./out/page.html", "--overwrite")
         self.succeed("preview", "out")
         self.refuse(2, "--overwrite", "preview", "out")
         self.refuse(2, "--overwrite", "slice-import", "out", "!", "slice-export", "again", "--page", "out.html")

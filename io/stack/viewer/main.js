@@ -230,4 +230,9 @@ window.viewer = {
   },
 };
 
-start();
+start().catch((reason) => {
+  $("name").textContent = "Slices";
+  $("warning").textContent = `This browser cannot show the page: ${reason.message}. It needs DecompressionStream and OffscreenCanvas.`;
+  $("warning").hidden = false;
+  console.error(reason);
+});

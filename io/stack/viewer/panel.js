@@ -141,7 +141,7 @@ const KEYS = [
   ["PgUp PgDn", "16 slices up or down"],
   ["Home End", "lowest, highest slice"],
   ["Ctrl wheel  + −", "larger, smaller; also two fingers"],
-  ["drag  ← →", "move; with Shift more. Drag the part to turn it"],
+  ["drag  ← →", "move; with Shift more. On the part: turn it, as ↑ ↓ do"],
   ["click", "place the cursor; the sections go through it"],
   ["double click", "four times as large there"],
   ["0", "all of the part"],
