@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import random
 import shutil
 import time
 import unittest
@@ -175,6 +176,28 @@ class Browser(Pages):
         self.assertEqual([row[1:3] for row in counts], [["4", "12"], ["2", "5"], ["4", "11"], ["10", "28"]])
         self.assertEqual(counts[3][3], f"{28 * 0.1 * 0.2 * 0.05 / 1000:.1e}".replace("e-05", "e-5"))
         self.check_silence()
+
+    def test_the_script_unpacks_what_was_packed(self):
+        # Large even areas, rims with grain, and areas of noise.
+        chance = random.Random(1)
+
+        def letter(x, y, z):
+            distance = (x - 35) ** 2 + 2 * (y - 20) ** 2 + (z - 18) ** 2
+            if distance > 700 + chance.randrange(200):
+                return "."
+            return chance.choice("RRRG") if x > 40 else "B" if y > 22 else "R"
+
+        stacks = {name: [["".join(letter(x, y, z) for x in range(75)) for y in range(40)] for z in range(36)] for name in ("out", "other")}
+        for name, slices in stacks.items():
+            self.make_stack(name, slices)
+        self.succeed("preview", "out", "--against", "other")
+        self.open("out.html")
+        named = {colour: letter for letter, colour in COLOURS.items()}
+        letters = "." + "".join(named[tuple(material["rgba"][:3])] for material in self.run_script("return viewer.page.materials"))
+        for stack, name in enumerate(("out", "other")):
+            for z, rows in enumerate(stacks[name]):
+                found = self.browser.execute_async_script("viewer.valuesOf(arguments[0], arguments[1]).then(arguments[2])", stack, z)
+                self.assertEqual(["".join(letters[value] for value in row) for row in found], rows, (name, z))
 
     def test_keys_wheels_fingers_and_buttons_lead_through_the_page(self):
         self.make_stack("out", SLICES * 12)

@@ -218,6 +218,11 @@ async function start() {
 // For tests, and for those who write their own scripts around the page.
 window.viewer = {
   page, state, setSlice, setCursor, setMode, setMaterial, setMain, setZoom, setTheme, showVoxels, showAll,
+  // The values of the voxels of a slice, row by row, from the top.
+  valuesOf: async (stack, slice) => {
+    const { crop, plane } = await sliceOf(stack, slice);
+    return Array.from({ length: height }, (_, y) => Array.from({ length: width }, (__, x) => crop.value(plane, x, y)));
+  },
   // Whether the sections show what is in sight as it is at the cursor.
   sectionsRead: () => state.cursor.every((place, axis) => place === sections.cursor[axis]) && [front, side].every((view) => {
     const [begin, end] = view.range().map((slice) => slice / SLICES_OF_GROUP);
