@@ -60,7 +60,7 @@ def main():
                     "const done = arguments[0]; (function wait() { if (viewer.sectionsRead()) done(); else setTimeout(wait, 100); })()")
                 time.sleep(1)
                 picture = Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("RGB")
-                picture.quantize(256, dither=Image.Dither.NONE).save(result / name, optimize=True)
+                picture.save(result / name, optimize=True)
                 print(f"picture   {result / name}")
         finally:
             browser.quit()
