@@ -83,16 +83,16 @@ class Files(Pages):
 
 @unittest.skipUnless(webdriver and shutil.which("chromium") and shutil.which("chromedriver"), "chromium and selenium are not installed")
 class Browser(Pages):
-    def setUp(self):
-        super().setUp()
+    @classmethod
+    def setUpClass(cls):
         options = webdriver.ChromeOptions()
         options.binary_location = shutil.which("chromium")
         for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader",
-                         "--window-size=1200,800", f"--user-data-dir={self.folder_of_class()}"):
+                         "--window-size=1200,800", f"--user-data-dir={cls.folder_of_class()}"):
             options.add_argument(argument)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-        self.browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
-        self.addCleanup(self.browser.quit)
+        cls.browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+        cls.addClassCleanup(cls.browser.quit)
 
     def open(self, name):
         self.browser.get(pathlib.Path(self.folder / name).as_uri())
@@ -282,9 +282,10 @@ class Browser(Pages):
         self.press("1")
         self.wait_for(f"return (() => {{{script}}})() === 0")
         self.check_silence()
-        self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source":
+        added = self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source":
             "const of = HTMLCanvasElement.prototype.getContext;"
             "HTMLCanvasElement.prototype.getContext = function(kind, ...rest) { return kind === 'webgl2' ? null : of.call(this, kind, ...rest); };"})
+        self.addCleanup(self.browser.execute_cdp_cmd, "Page.removeScriptToEvaluateOnNewDocument", added)
         self.open("out.html")
         self.assertTrue(self.browser.find_element("css selector", "#view-solid .sorry").is_displayed())
         self.assertEqual(self.pixel(6, 3), RED)
