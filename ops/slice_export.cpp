@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "io/stack/slice_spans.h"
 #include "io/stack/span_spool.h"
 #include "io/stack/stack_files.h"
+#include "io/stack/stack_page.h"
 #include "io/stack/stack_writer.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
@@ -70,6 +72,8 @@ class SliceExport : public Sink {
                  "Colour of empty voxels in " + sliceFormatNames([](const auto& format) {
                    return format.showsColours();
                  }) + ": #rrggbb, or r,g,b,a from 0 to 255");
+    options.file("page", page_name_, "FILE.html",
+                 "Writes a page to look through the slices too, as preview does");
     for (const SliceFormat* format : sliceFormats()) encoders_[format]->declare(options);
     overwrite_.declare(options, "the stack");
   }
@@ -100,6 +104,7 @@ class SliceExport : public Sink {
     }
     spool_.reset();
     printed_ = {};
+    planPage();
   }
 
   [[nodiscard]] OutputEstimate output() const override {
@@ -128,14 +133,14 @@ class SliceExport : public Sink {
       if (!spool_) spool_.emplace(std::filesystem::path(folder_).parent_path());
       if (spool_->size() == 0) first_kept_ = in.core.begin;
     } else if (!writer_) {
-      writer_.emplace(folder_, stack_, names_, *encoder_, blankLayers());
+      begin();
       checkWithin(in);
     }
     inGroups(in.core, [&](ZRange layers) {
       if (frame_.crop) {
         for (const SpanImage& slice : slices(in, layers, wholeLayout())) keep(slice, layers);
       } else {
-        writer_->add(layers, slices(in, layers, stack_.layout), in.grids);
+        add(layers, slices(in, layers, stack_.layout), in.grids);
       }
     });
   }
@@ -145,6 +150,11 @@ class SliceExport : public Sink {
     if (!writer_) throw DataError("no layer came to slice");
     stack_ = writer_->finish();
     writer_.reset();
+    if (page_) {
+      page_->finish(page_name_);
+      if (const std::string text = page_->warning(); !text.empty()) report().warn(text);
+      page_.reset();
+    }
     // Some layers of a job may well be empty.
     const std::vector<std::uint64_t>& voxels = stack_.voxels;
     if (stack_.layers == schema_.lattice.layers() &&
@@ -217,6 +227,17 @@ class SliceExport : public Sink {
           "needs a grid 'material' or 'solid'; put dither, and material-assign where there are "
           "materials, before it");
     }
+  }
+
+  void planPage() const {
+    if (page_name_.empty()) return;
+    const std::filesystem::path folder =
+        std::filesystem::absolute(folder_ + "/").lexically_normal();
+    const std::filesystem::path page = std::filesystem::absolute(page_name_).lexically_normal();
+    if (std::mismatch(folder.begin(), std::prev(folder.end()), page.begin(), page.end()).first ==
+        std::prev(folder.end()))
+      throw UsageError("--page: '" + page_name_ + "' lies in the stack, which holds slices only");
+    StackPage::check(page_name_, overwrite_.overwrite);
   }
 
   /// Names of files come from the prefix, and of folders from the materials.
@@ -312,16 +333,28 @@ class SliceExport : public Sink {
         frame_, part, *format_, printer_, [this](const std::string& text) { report().warn(text); },
         stack_);
     encoder_->plan(stack_, schema_.grids);
-    writer_.emplace(folder_, stack_, names_, *encoder_, blankLayers());
+    begin();
     inGroups({first_kept_, first_kept_ + static_cast<int>(spool_->size())}, [&](ZRange layers) {
       throwIfInterrupted();
       std::vector<SpanImage> kept;
       for (int z = layers.begin; z < layers.end; ++z)
         kept.push_back(spool_->read(static_cast<std::size_t>(z - first_kept_)));
-      writer_->add(
-          layers, sliceSpans(*gridOfSpans(kept, wholeLayout(), layers), stack_.layout, layers), {});
+      add(layers, sliceSpans(*gridOfSpans(kept, wholeLayout(), layers), stack_.layout, layers), {});
     });
     spool_.reset();
+  }
+
+  void begin() {
+    writer_.emplace(folder_, stack_, names_, *encoder_, blankLayers());
+    if (!page_name_.empty()) page_.emplace(schema_.lattice.layers(), pageStack(folder_, stack_));
+  }
+
+  void add(ZRange layers, std::vector<SpanImage> images, const Grids& grids) {
+    std::vector<SpanImage> shown;
+    if (page_) shown = images;
+    writer_->add(layers, std::move(images), grids);
+    for (std::size_t i = 0; i < shown.size(); ++i)
+      page_->add(layers.begin + static_cast<int>(i), {std::move(shown[i])});
   }
 
   [[nodiscard]] BlankLayers blankLayers() const {
@@ -361,6 +394,7 @@ class SliceExport : public Sink {
   int minimum_layers_ = 0;
   std::string format_given_;
   std::string name_given_;
+  std::string page_name_;
   OverwriteOption overwrite_;
   std::map<const SliceFormat*, std::unique_ptr<SliceEncoder>> encoders_;
 
@@ -372,6 +406,7 @@ class SliceExport : public Sink {
   std::optional<SpanSpool> spool_;  ///< slices whose frame is not known yet
   int first_kept_ = 0;              ///< the layer of the first of these
   openvdb::CoordBBox printed_;
+  std::optional<StackPage> page_;
 };
 
 }  // namespace

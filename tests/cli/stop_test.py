@@ -46,6 +46,7 @@ RUNS = {
     "mesh2sdf": lambda radius: (*surface(radius), "--slab", "8", "!", "write", "out.vdb"),
     "normals": lambda radius: ("normals", "-i", f"surface{radius}.vdb", "-o", "out.vdb"),
     "offset": lambda radius: (*surface(radius), "--band", "0.2mm", "!", "offset", "--by", "0.05mm", "-o", "out.vdb"),
+    "preview": lambda radius: ("preview", f"stack{radius}", "out.html"),
     "read": lambda radius: ("read", f"surface{radius}.vdb", "-o", "out.vdb"),
     "refine": lambda radius: (*surface(radius), "!", "dither", "!", "refine", "-o", "out.vdb"),
     "render": lambda radius: ("render", "part8.stl", "out.png", "--samples", 16 * radius),
@@ -108,7 +109,7 @@ class Stopped(ProgramTest):
                 if name in arguments:
                     self.make(name)
             before = self.listing()
-            one_thread = () if verb == "ssim" else ("--threads", 1)
+            one_thread = () if verb in ("preview", "ssim") else ("--threads", 1)
             process = start_program(self, *arguments, *one_thread)
             time.sleep(seconds)
             process.send_signal(number)
@@ -144,7 +145,7 @@ class Stopped(ProgramTest):
         self.stop_all(("compensate", "csg", "dither", "halftone", "hollow", "interlace", "material-assign", "normals", "offset", "refine", "separate", "simulate"))
 
     def test_sinks_and_tools_can_be_stopped(self):
-        self.stop_all(("compare", "info", "mask-spectrum", "measure", "mesh-export", "render", "slice-export", "ssim", "stats", "write"))
+        self.stop_all(("compare", "info", "mask-spectrum", "measure", "mesh-export", "preview", "render", "slice-export", "ssim", "stats", "write"))
 
 
 class Signals(ProgramTest):
