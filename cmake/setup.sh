@@ -9,8 +9,8 @@ program_packages=(build-essential cmake ninja-build libopenvdb-dev libboost-iost
   libturbojpeg0-dev libwebp-dev liblcms2-dev libdraco-dev libmeshoptimizer-dev libexpat1-dev python3)
 # To build and run the tests.
 test_packages=(libgtest-dev libgmock-dev libbenchmark-dev libspng-dev libopenvdb-tools
-  python3-openvdb python3-numpy python3-pil python3-skimage python3-matplotlib python3-jsonschema chromium chromium-driver
-  python3-selenium)
+  python3-openvdb python3-numpy python3-scipy python3-pil python3-skimage python3-matplotlib python3-jsonschema
+  chromium chromium-driver python3-selenium)
 sanitize_packages=(clang-14 libclang-rt-14-dev llvm-14)
 lint_packages=(clang-14 clang-format-14 clang-tidy-14 libclang-14-dev llvm-14-dev)
 
