@@ -150,6 +150,7 @@ void Regions::add(const Region& region) {
 }
 
 struct PrintRegions::State {
+  Least least;
   PrintFindings found;
   std::optional<Plane> last;
   std::vector<OpenRegion> open;        ///< the empty regions that have voxels in `last`
@@ -163,9 +164,14 @@ struct PrintRegions::State {
       if (!piece.below && !piece.above && piece.region.voxels == 1) {
         found.specks.add(piece.region);
       } else if (!piece.below && !is_lowest) {
-        found.islands.add(piece.region);
+        (piece.region.voxels >= least.island ? found.islands : found.small_islands)
+            .add(piece.region);
       }
     }
+  }
+
+  void addCup(const Region& region) {
+    if (region.voxels >= least.cup) found.cups.add(region);
   }
 
   void countEmpty(const Plane& plane) {
@@ -224,16 +230,18 @@ struct PrintRegions::State {
       if (open[n].is_outside) continue;
       const std::uint32_t to = renamed[sets.find(n)];
       if (to == none) {
-        (open[n].on_plate ? found.cups : found.cavities).add(open[n].region);
+        open[n].on_plate ? addCup(open[n].region) : found.cavities.add(open[n].region);
       } else if (next[to].is_outside) {
-        found.cups.add(open[n].region);
+        addCup(open[n].region);
       }
     }
     open = std::move(next);
   }
 };
 
-PrintRegions::PrintRegions() : state_(std::make_unique<State>()) {}
+PrintRegions::PrintRegions(const Least& least) : state_(std::make_unique<State>()) {
+  state_->least = least;
+}
 PrintRegions::~PrintRegions() = default;
 
 void PrintRegions::add(std::span<const Layer> layers) {
@@ -264,7 +272,7 @@ PrintFindings PrintRegions::finish() {
   if (!state.last) return {};
   state.countPrinted();
   for (const OpenRegion& region : state.open) {
-    if (!region.is_outside) state.found.cups.add(region.region);
+    if (!region.is_outside) state.addCup(region.region);
   }
   return std::exchange(state.found, {});
 }

@@ -35,6 +35,7 @@ struct PrintFindings {
   /// Regions of a layer, connected by faces, without a printed voxel below them, above the lowest
   /// printed layer. Specks are not among them.
   Regions islands;
+  Regions small_islands;  ///< the same, below the least size
   /// Printed voxels that touch no other by a face.
   Regions specks;
   /// Empty regions, connected by faces, that do not reach the outside.
@@ -50,7 +51,13 @@ struct PrintFindings {
 /// spans of two layers and of those that are added together, not the whole stack.
 class PrintRegions {
  public:
-  PrintRegions();
+  /// What is smaller counts as the grain of dithering, in voxels.
+  struct Least {
+    std::uint64_t island = 1;  ///< smaller islands are counted apart
+    std::uint64_t cup = 1;     ///< smaller cups are not told
+  };
+  PrintRegions() : PrintRegions(Least{}) {}
+  explicit PrintRegions(const Least& least);
   ~PrintRegions();
   PrintRegions(const PrintRegions&) = delete;
   PrintRegions& operator=(const PrintRegions&) = delete;
