@@ -1,9 +1,11 @@
 #include "io/image/png_decoder.h"
 
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "io/image/colour_image.h"
+#include "io/image/plain_png.h"
 #include "io/image/png_source.h"
 #include "vdbdither/model/errors.h"
 
@@ -14,6 +16,7 @@ SpanImage decodePng(std::span<const std::uint8_t> bytes, const SizeCheck& check)
 }
 
 ColourImage decodePngImage(std::span<const std::uint8_t> bytes, const SizeCheck& check) {
+  if (auto image = decodePlainPng(bytes, check)) return *std::move(image);
   PngSource source(bytes);
   png_structp png = source.png();
   png_infop info = source.info();
