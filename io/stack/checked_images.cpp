@@ -50,6 +50,13 @@ class ImageLayers : public CheckedStack {
   }
 
   void finish(const StackTotals& totals, Findings& findings) const override {
+    std::uint64_t printed = 0;
+    for (const auto& [colour, count] : totals.voxels) printed += count;
+    if (printed > 0 && printed == std::uint64_t{stack_.width()} * stack_.height() *
+                                      static_cast<std::uint64_t>(totals.layers)) {
+      findings.warning("no-background",
+                       "no pixel is empty; give the --background of the images if they have one");
+    }
     if (totals.grey.pixels > 0) {
       findings.add({"grey-pixels", Finding::Severity::warning,
                     counted(totals.grey.pixels, "pixel") + " of " +
