@@ -79,7 +79,8 @@ inline RowInflater::Entry RowInflater::decode(const Table& table) {
 }
 
 bool RowInflater::makeTable(std::span<const std::uint8_t> lengths,
-                            const std::function<Entry(std::size_t symbol)>& entryOf, Table& table) {
+                            const std::function<Entry(std::size_t symbol)>& entry_of,
+                            Table& table) {
   std::array<std::uint32_t, most_bits + 2> count{};
   for (const std::uint8_t length : lengths) ++count[length];
   count[0] = 0;
@@ -102,7 +103,7 @@ bool RowInflater::makeTable(std::span<const std::uint8_t> lengths,
     std::uint32_t code = 0;
     for (std::uint32_t forward = next[bits]++, i = 0; i < static_cast<std::uint32_t>(bits); ++i)
       code |= (forward >> i & 1) << (bits - 1 - static_cast<int>(i));
-    Entry entry = entryOf(symbol);
+    Entry entry = entry_of(symbol);
     entry.bits = static_cast<std::uint8_t>(bits);
     if (bits <= first_bits) {
       for (std::size_t i = code; i < std::size_t{1} << first_bits; i += std::size_t{1} << bits)

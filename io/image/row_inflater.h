@@ -39,7 +39,7 @@ class RowInflater {
   using Table = std::vector<Entry>;
 
   [[nodiscard]] static bool makeTable(std::span<const std::uint8_t> lengths,
-                                      const std::function<Entry(std::size_t symbol)>& entryOf,
+                                      const std::function<Entry(std::size_t symbol)>& entry_of,
                                       Table& table);
 
   void refill();
