@@ -81,9 +81,10 @@ Material materialOfColour(std::uint32_t colour) {
 class Verify : public Tool {
  public:
   void declare(Options& options) override {
-    options.positional("stack", path_,
-                       "Stack of slices: a folder with manifest.json or a zip archive of one, a "
-                       "container (.gcvf, .sl1, .uvj), or numbered images of another program");
+    options.positional(
+        "stack", path_,
+        "Stack of slices: a folder with manifest.json or a zip archive of one, a "
+        "container (.gcvf, .sl1, .uvj, .3mf), or numbered images of another program");
     options.file("against", against_, "VDB",
                  "Also tells where the stack is not voxel for voxel the grid 'material' or 'solid' "
                  "of this .vdb");

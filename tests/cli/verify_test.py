@@ -26,7 +26,7 @@ RECIPES = {
     "drawn.vdb": ("slice-import", "drawn", "--printer", "jet.json", *PALETTE, "-o", "drawn.vdb"),
     "vat.vdb": ("slice-import", "drawn", "--printer", "vat.json", *BLACK, "!", "material-assign", "--material", "solid", "-o", "vat.vdb"),
     **{f"{kind}-out": ("slice-export", "-i", "drawn.vdb", f"{kind}-out", "--format", kind) for kind in ("png", "png1", "png8", "tiff", "exr", "objet")},
-    **{name: ("slice-export", "-i", "drawn.vdb", name) for name in ("out.zip", "out.gcvf")},
+    **{name: ("slice-export", "-i", "drawn.vdb", name) for name in ("out.zip", "out.gcvf", "out.3mf")},
     **{name: ("slice-export", "-i", "vat.vdb", name) for name in ("out.sl1", "out.uvj")},
 }
 
@@ -357,7 +357,7 @@ class Verify(ProgramTest):
     # Against the .vdb
 
     def test_a_stack_is_what_the_vdb_says(self):
-        for stack in ("png-out", "png1-out", "png8-out", "tiff-out", "exr-out", "objet-out", "out.zip", "out.gcvf"):
+        for stack in ("png-out", "png1-out", "png8-out", "tiff-out", "exr-out", "objet-out", "out.zip", "out.gcvf", "out.3mf"):
             with self.subTest(stack=stack):
                 self.make(stack, "drawn.vdb")
                 self.succeed("verify", stack, "--against", "drawn.vdb")
