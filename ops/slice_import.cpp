@@ -194,7 +194,7 @@ struct ImageOptions {
                  "Colour of the empty voxels in images without a manifest, also as #rrggbb; grey "
                  "images take black or white. By default black, and none if the images have "
                  "opacity");
-    options.words({{black, "Black"}, {white, "White"}});
+    options.words({{"black", "Black"}, {"white", "White"}});
     options.flag("flip-x", flip_x,
                  "Takes the first column of these images as that of the greatest x");
     options.flag("flip-y", flip_y, "Takes the first row of these images as that of the least y");
@@ -212,21 +212,7 @@ struct ImageOptions {
 
   [[nodiscard]] bool makesMaterials() const { return !materials.empty(); }
 
-  /// As rgba() makes it. Throws UsageError.
-  [[nodiscard]] std::optional<std::uint32_t> backgroundColour() const {
-    if (background.empty()) return std::nullopt;
-    if (background == black) return rgba(0, 0, 0);
-    if (background == white) return rgba(255, 255, 255);
-    try {
-      return rgba(parseColour(background));
-    } catch (const UsageError& error) {
-      throw UsageError(std::string("--background: ") + error.what());
-    }
-  }
-
   static constexpr const char* palette = "palette";
-  static constexpr const char* black = "black";
-  static constexpr const char* white = "white";
 };
 
 /// The name of a material by its colour.
@@ -253,17 +239,17 @@ class ImageLayers : public Input {
     schema_.lattice.pitch_mm = targetPitchMm(options.target, schema_);
     if (options.makesMaterials() && options.materials != ImageOptions::palette)
       throw UsageError("--materials: '" + options.materials + "' is not known; give palette");
-    background_ = options.backgroundColour();
+    empty_.background = backgroundColour(options.background);
     stack_ = std::make_unique<ImageStack>(path_, warn);
     schema_.lattice.box = openvdb::CoordBBox(
         {0, 0, 0}, {static_cast<int>(stack_->width()) - 1, static_cast<int>(stack_->height()) - 1,
                     stack_->layers() - 1});
     layout_ = {.box = schema_.lattice.box, .flip_x = options.flip_x, .flip_y = options.flip_y};
     makes_materials_ = options.makesMaterials();
-    is_mask_ = stack_->isGrey() && !makes_materials_;
-    if (!background_ && !stack_->hasOpacity()) background_ = rgba(0, 0, 0);
-    if (is_mask_ && background_ && background_ != rgba(0, 0, 0) &&
-        background_ != rgba(255, 255, 255)) {
+    empty_.is_mask = stack_->isGrey() && !makes_materials_;
+    if (!empty_.background && !stack_->hasOpacity()) empty_.background = rgba(0, 0, 0);
+    if (empty_.is_mask && empty_.background && empty_.background != rgba(0, 0, 0) &&
+        empty_.background != rgba(255, 255, 255)) {
       throw UsageError("--background: '" + stack_->shown(0) + "' is grey; give black or white");
     }
     planGrids();
@@ -307,15 +293,9 @@ class ImageLayers : public Input {
       schema_.grids[material_grid] = emptyGrid<openvdb::Int32Grid>(material_grid, schema_.lattice);
       return;
     }
-    if (is_mask_) return;
+    if (empty_.is_mask) return;
     schema_.grids[colour_grid] = emptyColours(schema_.lattice);
     if (stack_->hasOpacity()) schema_.grids[opacity_grid] = emptyOpacities(schema_.lattice);
-  }
-
-  [[nodiscard]] bool isEmpty(std::uint32_t colour) const {
-    if (colour >> 24 == 0) return true;
-    if (is_mask_) return ((colour & 255) > 127) == (background_ == rgba(255, 255, 255));
-    return colour == background_;
   }
 
   /// The spans of a layer: 0 where it is empty, else the index of the material, the colour, or 1 in
@@ -323,11 +303,11 @@ class ImageLayers : public Input {
   [[nodiscard]] SpanImage layer(int z) const {
     SpanImage image = stack_->layer(z);
     for (Span& span : image.spans) {
-      if (isEmpty(span.value)) {
+      if (empty_.contains(span.value)) {
         span.value = 0;
       } else if (makes_materials_) {
         span.value = indices_.at(span.value);
-      } else if (is_mask_) {
+      } else if (empty_.is_mask) {
         span.value = 1;
       }
     }
@@ -369,7 +349,7 @@ class ImageLayers : public Input {
     std::vector<std::uint32_t> colours;
     std::unordered_set<std::uint32_t> known;
     for (const Span& span : stack_->layer(z).spans) {
-      if (isEmpty(span.value) || !known.insert(span.value).second) continue;
+      if (empty_.contains(span.value) || !known.insert(span.value).second) continue;
       colours.push_back(span.value);
       if (colours.size() > most_materials) break;
     }
@@ -380,11 +360,10 @@ class ImageLayers : public Input {
 
   std::string path_;
   Schema schema_;
-  std::optional<std::uint32_t> background_;
   std::unique_ptr<ImageStack> stack_;
   SliceLayout layout_;
   bool makes_materials_ = false;
-  bool is_mask_ = false;
+  EmptyPixels empty_;
   std::unordered_map<std::uint32_t, std::uint32_t> indices_;  ///< of the materials, by colour
 };
 

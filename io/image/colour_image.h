@@ -13,6 +13,7 @@ struct ColourImage {
   SpanImage pixels;  ///< colours as rgba() makes them, as they are encoded; opacity is straight
   bool is_grey = false;
   bool has_opacity = false;
+  bool is_rgba8 = false;  ///< whether the file has 32 bits a pixel: colour and opacity
 };
 
 /// The pixels of a PNG, as decodePng() reads them.

@@ -1,9 +1,11 @@
 #include "io/image/png_decoder.h"
 
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "io/image/colour_image.h"
+#include "io/image/plain_png.h"
 #include "io/image/png_source.h"
 #include "vdbdither/model/errors.h"
 
@@ -14,6 +16,7 @@ SpanImage decodePng(std::span<const std::uint8_t> bytes, const SizeCheck& check)
 }
 
 ColourImage decodePngImage(std::span<const std::uint8_t> bytes, const SizeCheck& check) {
+  if (auto image = decodePlainPng(bytes, check)) return *std::move(image);
   PngSource source(bytes);
   png_structp png = source.png();
   png_infop info = source.info();
@@ -24,6 +27,7 @@ ColourImage decodePngImage(std::span<const std::uint8_t> bytes, const SizeCheck&
   if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE)
     throw DataError("is interlaced; save it without");
   const int kind = png_get_color_type(png, info);
+  const int depth = png_get_bit_depth(png, info);
   const bool has_opacity =
       (kind & PNG_COLOR_MASK_ALPHA) != 0 || png_get_valid(png, info, PNG_INFO_tRNS) != 0;
   png_set_expand(png);
@@ -47,7 +51,8 @@ ColourImage decodePngImage(std::span<const std::uint8_t> bytes, const SizeCheck&
   png_read_end(png, nullptr);
   return {.pixels = spans.finish(),
           .is_grey = (kind & PNG_COLOR_MASK_COLOR) == 0,
-          .has_opacity = has_opacity};
+          .has_opacity = has_opacity,
+          .is_rgba8 = kind == PNG_COLOR_TYPE_RGB_ALPHA && depth == 8};
 }
 
 }  // namespace vdbdither

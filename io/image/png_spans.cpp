@@ -15,13 +15,12 @@
 #include <zlib.h>
 
 #include "io/image/deflate_writer.h"
+#include "io/image/row_adler.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 
 namespace {
-
-constexpr std::uint32_t adler_modulus = 65521;
 
 class SpanDeflater {
  public:
@@ -42,13 +41,13 @@ class SpanDeflater {
     for (std::uint32_t y = 0; y < image_.height; ++y) {
       row_begin_ = spans_.size();
       loadRow(y);
-      addToAdler();
+      adler_.addRow(std::span(spans_).subspan(row_begin_), unit_, units_);
       encodeRow(y);
       above_begin_ = row_begin_;
     }
     closeMatch();
     deflate_.finish();
-    return sum_ | weighted_sum_ << 16;
+    return adler_.value();
   }
 
  private:
@@ -112,32 +111,6 @@ class SpanDeflater {
       x = span.end;
     }
     if (x % 8) append(x / 8 + 1, byte);
-  }
-
-  /// In closed form: a span of n units with byte sum S and Σ j·byte_j = J, r bytes before the row's
-  /// end, adds n·S to the one sum and S·(n·r − unit·n(n−1)/2) − n·J to the other.
-  void addToAdler() {
-    std::uint64_t row_sum = 0;
-    std::uint64_t row_weighted = 0;
-    std::uint64_t begin = 0;
-    for (std::size_t i = row_begin_; i < spans_.size(); ++i) {
-      const std::uint32_t value = spans_[i].value;
-      const std::uint64_t count = spans_[i].end - begin;
-      const std::uint64_t rest = unit_ * (units_ - begin);
-      std::uint64_t sum = value & 255;
-      std::uint64_t moment = 0;
-      for (unsigned j = 1; j < unit_; ++j) {
-        const std::uint64_t byte = value >> (8 * j) & 255;
-        sum += byte;
-        moment += j * byte;
-      }
-      row_sum += count * sum;
-      row_weighted += sum * (count * rest - unit_ * (count * (count - 1) / 2)) - count * moment;
-      begin = spans_[i].end;
-    }
-    weighted_sum_ = static_cast<std::uint32_t>(
-        (weighted_sum_ + stride_ % adler_modulus * sum_ + row_weighted) % adler_modulus);
-    sum_ = static_cast<std::uint32_t>((sum_ + row_sum) % adler_modulus);
   }
 
   /// Hashes of the spans that start at each span of the row.
@@ -216,8 +189,7 @@ class SpanDeflater {
   std::array<std::vector<Seen>, orders> seen_;           ///< per order, by hash
   std::uint32_t open_match_ =
       0;  ///< bytes so far of a match with the row above that goes on in the next row
-  std::uint64_t sum_ = 1;
-  std::uint64_t weighted_sum_ = 0;
+  RowAdler adler_;
 };
 
 void SpanDeflater::closeMatch() {

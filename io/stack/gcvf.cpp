@@ -2,8 +2,10 @@
 // by Stratasys; after public writers of it and the sample that they quote.
 
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <map>
+#include <span>
 #include <sstream>
 #include <utility>
 
@@ -23,6 +25,8 @@ namespace vdbdither {
 namespace {
 
 constexpr const char* configuration_name = "ConfigFile.xml";
+constexpr const char* bounds_name = "MeshBbx.ktn";
+constexpr const char* mesh_name = "Mesh.stl";
 constexpr double inch_mm = 25.4;
 constexpr int most_dpi = 65535;
 constexpr double nanometre_mm = 1e-6;
@@ -97,8 +101,8 @@ class GcvfSlices : public SliceEncoder {
     for (const openvdb::Vec3d& corner : {openvdb::Vec3d(0), size}) {
       for (int axis = 0; axis < 3; ++axis) putFloat(bounds, corner[axis]);
     }
-    output.write("MeshBbx.ktn", bounds);
-    output.write("Mesh.stl", boxMesh(size * pitchMm()));
+    output.write(bounds_name, bounds);
+    output.write(mesh_name, boxMesh(size * pitchMm()));
   }
 
  private:
@@ -134,9 +138,17 @@ class GcvfSlices : public SliceEncoder {
 };
 
 /// Gathers the texts of the elements that say what the slices are.
-class ConfigurationReader : public XmlReader {
+class ConfigurationReader final : public XmlReader {
  public:
-  explicit ConfigurationReader(const std::string& shown) : XmlReader(shown), shown_(shown) {}
+  explicit ConfigurationReader(const StackInput& files)
+      : XmlReader(shownIn(files)), shown_(shownIn(files)) {
+    read(files.read(configuration_name, most_configuration_bytes));
+    finish();
+  }
+
+  static std::string shownIn(const StackInput& files) {
+    return "'" + files.shown(configuration_name) + "'";
+  }
 
   [[nodiscard]] ContainerContents contents() const {
     ContainerContents contents;
@@ -152,11 +164,45 @@ class ConfigurationReader : public XmlReader {
       return prefix + std::to_string(first + layer) + ".png";
     };
     contents.background = colour(text("BackGroundMaterialRGBA"));
-    for (const auto& [name, rgba] : materials_) contents.materials.push_back({name, colour(rgba)});
+    for (const MaterialTexts& material : materials_)
+      contents.materials.push_back({material.name, colour(material.rgba)});
     return contents;
   }
 
+  /// Tells what contradicts the slices.
+  void check(std::span<const std::uint64_t> voxels, const std::string& file,
+             Findings& findings) const {
+    const auto most = texts_.find("MaxNumberOfColors");
+    if (most != texts_.end() && wholeOf(most->second) < materials_.size()) {
+      findings.error("too-many-colours",
+                     "it lists " + std::to_string(materials_.size()) +
+                         " materials, and MaxNumberOfColors is " + most->second +
+                         "; make the stack of fewer",
+                     file);
+    }
+    for (std::size_t i = 0; i < materials_.size(); ++i) {
+      const MaterialTexts& material = materials_[i];
+      if (material.voxels.empty() || wholeOf(material.voxels) == voxels[i]) continue;
+      findings.error("voxel-count",
+                     "its VoxelCount of '" + material.name + "' is " + material.voxels +
+                         ", and the slices have " + std::to_string(voxels[i]) +
+                         "; make the stack again",
+                     file);
+    }
+  }
+
  private:
+  struct MaterialTexts {
+    std::string name, rgba, voxels;
+  };
+
+  /// The greatest number for what is none.
+  static std::uint64_t wholeOf(const std::string& text) {
+    std::uint64_t number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return error == std::errc() && end == text.data() + text.size() ? number : ~std::uint64_t{0};
+  }
+
   void begin(const XmlElement& element) override {
     text_.clear();
     if (element.name() == "Material") {
@@ -180,8 +226,9 @@ class ConfigurationReader : public XmlReader {
     if (name == "Material") {
       in_material_ = false;
     } else if (in_material_) {
-      if (name == "Name") materials_.back().first = value;
-      if (name == "RGBA") materials_.back().second = value;
+      if (name == "Name") materials_.back().name = value;
+      if (name == "RGBA") materials_.back().rgba = value;
+      if (name == "VoxelCount") materials_.back().voxels = value;
     } else if (!value.empty()) {
       texts_.try_emplace(name, value);
     }
@@ -221,20 +268,84 @@ class ConfigurationReader : public XmlReader {
   std::string text_;
   bool in_material_ = false;
   std::map<std::string, std::string> texts_;
-  std::vector<std::pair<std::string, std::string>> materials_;  ///< name and colour
+  std::vector<MaterialTexts> materials_;
 };
 
 std::optional<DescribedStack> describeGcvf(const StackInput& files) {
   if (!files.contains(configuration_name)) return std::nullopt;
-  const std::string shown = "'" + files.shown(configuration_name) + "'";
-  ConfigurationReader reader(shown);
-  reader.read(files.read(configuration_name, most_configuration_bytes));
-  reader.finish();
-  ContainerContents contents = reader.contents();
+  ContainerContents contents = ConfigurationReader(files).contents();
   contents.format = "gcvf";
   contents.configuration = configuration_name;
-  contents.shown = shown;
+  contents.shown = ConfigurationReader::shownIn(files);
   return describedBy(contents, files);
+}
+
+double floatAt(std::span<const std::uint8_t> bytes, std::size_t at) {
+  std::uint32_t bits = 0;
+  for (std::size_t i = 0; i < 4; ++i) bits |= std::uint32_t{bytes[at + i]} << 8 * i;
+  return std::bit_cast<float>(bits);
+}
+
+/// Returns a file that every GCVF has, or tells that it is missing.
+std::vector<std::uint8_t> companion(const StackInput& files, const char* name, Findings& findings) {
+  if (files.contains(name)) return files.read(name, most_configuration_bytes);
+  findings.error("missing-file", "the file is missing; make the stack again", files.shown(name));
+  return {};
+}
+
+/// The corners of a binary STL, or an empty box.
+openvdb::BBoxd boundsOf(std::span<const std::uint8_t> stl) {
+  constexpr std::size_t header = 84;
+  constexpr std::size_t triangle = 50;
+  openvdb::BBoxd bounds;
+  for (std::size_t at = header; at + triangle <= stl.size(); at += triangle) {
+    for (std::size_t corner = 1; corner <= 3; ++corner) {
+      openvdb::Vec3d point;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        point[static_cast<int>(axis)] = floatAt(stl, at + 12 * corner + 4 * axis);
+      bounds.expand(point);
+    }
+  }
+  return bounds;
+}
+
+void checkGcvf(const StackInput& files, const DescribedStack& stack,
+               std::span<const std::uint64_t> voxels, Findings& findings) {
+  ConfigurationReader(files).check(voxels, files.shown(configuration_name), findings);
+  const SliceLayout& layout = stack.manifest.layout;
+  const openvdb::Vec3d size(layout.width(), layout.height(), stack.manifest.layers.size());
+  const auto bounds = companion(files, bounds_name, findings);
+  std::vector<std::uint8_t> expected;
+  for (const openvdb::Vec3d& corner : {openvdb::Vec3d(0), size}) {
+    for (int axis = 0; axis < 3; ++axis) putFloat(expected, corner[axis]);
+  }
+  if (!bounds.empty() && bounds != expected) {
+    findings.error("mesh-bounds",
+                   "the box is not that of the slices, 0 0 0 to " + shortestText(size.x()) + " " +
+                       shortestText(size.y()) + " " + shortestText(size.z()) +
+                       " voxels; make the stack again",
+                   files.shown(bounds_name));
+  }
+  const auto mesh = companion(files, mesh_name, findings);
+  if (mesh.empty()) return;
+  const openvdb::Vec3d size_mm = size * stack.manifest.lattice.pitch_mm;
+  const openvdb::BBoxd box = boundsOf(mesh);
+  const openvdb::Vec3d least(0, -size_mm.y(), 0);
+  const openvdb::Vec3d most(size_mm.x(), 0, size_mm.z());
+  for (int axis = 0; axis < 3; ++axis) {
+    // Half a voxel, and what single precision leaves of long ones.
+    const double tolerance_mm =
+        0.5 * stack.manifest.lattice.pitch_mm[axis] + 1e-6 * std::abs(size_mm[axis]);
+    if (std::abs(box.min()[axis] - least[axis]) <= tolerance_mm &&
+        std::abs(box.max()[axis] - most[axis]) <= tolerance_mm)
+      continue;
+    findings.error("mesh-bounds",
+                   std::string("along ") + "xyz"[axis] + " the mesh does not go from " +
+                       shortestText(std::round(least[axis] * 1e3) / 1e3) + " to " +
+                       shortestText(std::round(most[axis] * 1e3) / 1e3) +
+                       " mm as the slices do; make the stack again",
+                   files.shown(mesh_name));
+  }
 }
 
 }  // namespace
@@ -250,6 +361,7 @@ const SliceFormat gcvf{.name = "gcvf",
                        .bytes_per_leaf = 125,
                        .container_ending = ".gcvf",
                        .describe = describeGcvf,
+                       .check = checkGcvf,
                        .names = &gcvf_names};
 
 }  // namespace vdbdither

@@ -57,12 +57,16 @@ void sortBy(Names& names, std::size_t column) {
   });
 }
 
-/// The first of sorted names that the next one does not follow by one.
+/// Whether the second of two sorted names does not follow the first one by one.
+auto isGap(std::size_t column) {
+  return [column](const NumberedName& a, const NumberedName& b) {
+    return b.numbers[column] != a.numbers[column] + 1;
+  };
+}
+
+/// The first of sorted names that the next one does not follow.
 Names::const_iterator firstGap(const Names& names, std::size_t column) {
-  return std::adjacent_find(names.begin(), names.end(),
-                            [&](const NumberedName& a, const NumberedName& b) {
-                              return b.numbers[column] != a.numbers[column] + 1;
-                            });
+  return std::adjacent_find(names.begin(), names.end(), isGap(column));
 }
 
 bool varies(const Names& names, std::size_t column) {
@@ -71,22 +75,22 @@ bool varies(const Names& names, std::size_t column) {
   });
 }
 
-[[noreturn]] void refuseOrder(const Names& names, std::size_t column, const std::string& shown) {
-  const auto gap = firstGap(names, column);
+/// What is wrong between a name and the next one.
+std::string gapText(Names::const_iterator gap, std::size_t column) {
   const std::uint64_t number = gap->numbers[column];
+  const std::uint64_t next = std::next(gap)->numbers[column];
   const std::string both = "'" + gap->name + "' and '" + std::next(gap)->name + "'";
-  if (std::next(gap)->numbers[column] == number) {
-    throw DataError("'" + shown + "': " + both + " have the same number " + std::to_string(number) +
-                    "; remove one of them");
-  }
-  throw DataError("'" + shown + "': number " + std::to_string(number + 1) + " is missing between " +
-                  both + "; add the slice, or number them without a gap");
+  if (next == number)
+    return both + " have the same number " + std::to_string(number) + "; remove one of them";
+  return "number " + std::to_string(number + 1) + " is missing between " + both +
+         "; add the slice, or number them without a gap";
 }
 
 }  // namespace
 
 std::vector<std::string> inOrderOfNumbers(const std::vector<std::string>& names,
-                                          const std::string& shown) {
+                                          const std::string& shown,
+                                          const std::function<void(const std::string&)>& faults) {
   if (names.size() < 2) return names;
   Names numbered;
   for (const std::string& name : names) {
@@ -114,7 +118,11 @@ std::vector<std::string> inOrderOfNumbers(const std::vector<std::string>& names,
   // Where no number varies, the names differ in zeros or in their endings.
   const std::size_t column = last_varying.value_or(numbered.front().numbers.size() - 1);
   sortBy(numbered, column);
-  if (firstGap(numbered, column) != numbered.end()) refuseOrder(numbered, column, shown);
+  for (auto gap = firstGap(numbered, column); gap != numbered.end();) {
+    if (!faults) throw DataError("'" + shown + "': " + gapText(gap, column));
+    faults(gapText(gap, column));
+    gap = std::adjacent_find(std::next(gap), numbered.cend(), isGap(column));
+  }
   std::vector<std::string> ordered;
   for (const NumberedName& one : numbered) ordered.push_back(one.name);
   return ordered;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,11 @@ namespace vdbdither {
 /// where names follow several patterns, where a number is missing, and where two files have the
 /// same number.
 /// @param names  of images, all in one folder, in any order
-/// @param shown  what messages call the stack, without quotes
-std::vector<std::string> inOrderOfNumbers(const std::vector<std::string>& names,
-                                          const std::string& shown);
+/// @param shown   what messages call the stack, without quotes
+/// @param faults  where given, told of each number that is missing or there twice, in place of an
+///                error
+std::vector<std::string> inOrderOfNumbers(
+    const std::vector<std::string>& names, const std::string& shown,
+    const std::function<void(const std::string&)>& faults = {});
 
 }  // namespace vdbdither

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "io/image/png_spans.h"
+#include "io/profile/material_table.h"
 #include "io/stack/image_order.h"
 #include "io/stack/slice_format.h"
 #include "vdbdither/model/errors.h"
@@ -103,6 +105,23 @@ void tellLeftOut(const std::vector<std::string>& all, std::vector<std::string> s
 
 }  // namespace
 
+bool EmptyPixels::contains(std::uint32_t colour) const {
+  if (colour >> 24 == 0) return true;
+  if (is_mask) return ((colour & 255) > 127) == (background == rgba(255, 255, 255));
+  return colour == background;
+}
+
+std::optional<std::uint32_t> backgroundColour(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  if (text == "black") return rgba(0, 0, 0);
+  if (text == "white") return rgba(255, 255, 255);
+  try {
+    return rgba(parseColour(text));
+  } catch (const UsageError& error) {
+    throw UsageError(std::string("--background: ") + error.what());
+  }
+}
+
 bool ImageStack::isAt(const fs::path& path) {
   if (isPattern(path)) return true;
   std::error_code none;
@@ -118,25 +137,37 @@ bool ImageStack::isAt(const fs::path& path) {
   }
 }
 
-ImageStack::ImageStack(fs::path path, const std::function<void(const std::string&)>& warn)
+ImageStack::ImageStack(fs::path path, const std::function<void(const std::string&)>& warn,
+                       const std::function<void(const std::string&)>& faults)
     : path_(std::move(path)),
       files_(StackInput::withoutManifest(isPattern(path_) ? path_.parent_path() : path_)),
-      names_(findImages(warn)) {
+      names_(findImages(warn, faults)) {
   if (names_.size() > std::size_t{1} << 24)
     throw DataError("'" + path_.string() + "' has more slices than can be counted");
-  const ColourImage first = read(0, [](std::uint32_t width, std::uint32_t height) {
-    if (std::uint64_t{width} * height <= most_pixels) return;
-    throw DataError("has " + std::to_string(width) + " x " + std::to_string(height) +
-                    " pixels; at most " + std::to_string(most_pixels) + " are read");
-  });
+  const ColourImage first = readFirst(static_cast<bool>(faults));
   width_ = first.pixels.width;
   height_ = first.pixels.height;
   is_grey_ = first.is_grey;
   has_opacity_ = first.has_opacity;
 }
 
+ColourImage ImageStack::readFirst(bool passes_over) const {
+  for (int z = 0;; ++z) {
+    try {
+      return read(z, [](std::uint32_t width, std::uint32_t height) {
+        if (std::uint64_t{width} * height <= most_pixels) return;
+        throw DataError("has " + std::to_string(width) + " x " + std::to_string(height) +
+                        " pixels; at most " + std::to_string(most_pixels) + " are read");
+      });
+    } catch (const DataError&) {
+      if (!passes_over || z + 1 == layers()) throw;
+    }
+  }
+}
+
 std::vector<std::string> ImageStack::findImages(
-    const std::function<void(const std::string&)>& warn) const {
+    const std::function<void(const std::string&)>& warn,
+    const std::function<void(const std::string&)>& faults) const {
   const bool is_pattern = isPattern(path_);
   const std::string pattern = path_.filename().string();
   ImagesByFolder images;
@@ -155,7 +186,7 @@ std::vector<std::string> ImageStack::findImages(
   }
   if (images.empty()) refuseWithoutImages(path_.string(), is_pattern, passed_over);
   std::vector<std::string> slices =
-      inOrderOfNumbers(slicesIn(images, path_.string()), path_.string());
+      inOrderOfNumbers(slicesIn(images, path_.string()), path_.string(), faults);
   const auto other_kind = std::find_if(slices.begin(), slices.end(), [&](const std::string& name) {
     return isPng(name) != isPng(slices.front());
   });

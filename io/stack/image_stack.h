@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,17 @@
 #include "io/stack/stack_files.h"
 
 namespace vdbdither {
+
+/// Which pixels of images without a manifest are empty.
+struct EmptyPixels {
+  std::optional<std::uint32_t> background;  ///< as rgba() makes it; nothing: the transparent ones
+  bool is_mask = false;                     ///< images are grey, and grey is split in the middle
+
+  [[nodiscard]] bool contains(std::uint32_t colour) const;
+};
+
+/// Reads the value of --background. Throws UsageError.
+std::optional<std::uint32_t> backgroundColour(const std::string& text);
 
 /// Slices of another program: numbered images of one size without a manifest, PNG or TIFF.
 class ImageStack {
@@ -20,9 +32,12 @@ class ImageStack {
 
   /// Finds and orders the slices, and reads the first one.
   /// @param path  for which `isAt` is true
-  /// @param warn  told of files that are passed over
+  /// @param warn    told of files that are passed over
+  /// @param faults  where given, told of numbers that are missing or there twice, and the first
+  ///                slice that can be read stands for the first one
   /// Throws DataError.
-  ImageStack(std::filesystem::path path, const std::function<void(const std::string&)>& warn);
+  ImageStack(std::filesystem::path path, const std::function<void(const std::string&)>& warn,
+             const std::function<void(const std::string&)>& faults = {});
 
   [[nodiscard]] int layers() const { return static_cast<int>(names_.size()); }
   [[nodiscard]] std::uint32_t width() const { return width_; }
@@ -38,10 +53,14 @@ class ImageStack {
   /// one. Safe to call from many threads. Throws DataError.
   [[nodiscard]] SpanImage layer(int z) const;
 
+  /// Returns the image of layer `z` as it is. Safe to call from many threads. Throws DataError.
+  [[nodiscard]] ColourImage read(int z, const SizeCheck& check) const;
+
  private:
   [[nodiscard]] std::vector<std::string> findImages(
-      const std::function<void(const std::string&)>& warn) const;
-  [[nodiscard]] ColourImage read(int z, const SizeCheck& check) const;
+      const std::function<void(const std::string&)>& warn,
+      const std::function<void(const std::string&)>& faults) const;
+  [[nodiscard]] ColourImage readFirst(bool passes_over) const;
 
   std::filesystem::path path_;
   StackInput files_;

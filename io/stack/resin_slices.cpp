@@ -49,4 +49,15 @@ std::vector<SliceFile> ResinSlices::encode(const SliceLayer& layer) const {
   return {{name, "", encodePng(layer.image, {PngPixels::grey8, grey})}};
 }
 
+void tellMissingPictures(const StackInput& files, std::span<const char* const> names,
+                         Findings& findings) {
+  for (const char* name : names) {
+    if (files.contains(name)) continue;
+    findings.warning("missing-picture",
+                     "the picture is missing, which some printers show in their list of jobs; make "
+                     "the stack again",
+                     files.shown(name));
+  }
+}
+
 }  // namespace vdbdither

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,10 @@ class ResinSlices : public SliceEncoder {
   bool grey_ = false;
   std::optional<double> dose_;
 };
+
+/// Warns of pictures that a container lacks, which printers and programs show in lists.
+void tellMissingPictures(const StackInput& files, std::span<const char* const> names,
+                         Findings& findings);
 
 /// The resin of the slices of a container.
 inline MaterialTable resinTable() { return {{"solid", {240, 240, 240, 255}}}; }

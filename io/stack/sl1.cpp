@@ -2,6 +2,8 @@
 // formats of other makers. After the writer of PrusaSlicer 2.5 and the reader of UVtools.
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <sstream>
 
 #include "io/file/key_values.h"
@@ -19,6 +21,8 @@ namespace {
 
 constexpr const char* job_name = "config.ini";
 constexpr const char* slicer_name = "prusaslicer.ini";
+constexpr std::array<const char*, 2> thumbnail_names{"thumbnail/thumbnail400x400.png",
+                                                     "thumbnail/thumbnail800x480.png"};
 constexpr int number_digits = 5;
 const SliceNames sl1_names{"slice", number_digits, 0};
 
@@ -29,8 +33,8 @@ class Sl1Slices : public ResinSlices {
   void finish(const Manifest& stack, const SpanImage& preview, StackOutput& output) const override {
     writeText(output, job_name, job(stack));
     writeText(output, slicer_name, slicer(stack));
-    output.write("thumbnail/thumbnail400x400.png", encodePicture(thumbnailOf(preview, 400, 400)));
-    output.write("thumbnail/thumbnail800x480.png", encodePicture(thumbnailOf(preview, 800, 480)));
+    output.write(thumbnail_names[0], encodePicture(thumbnailOf(preview, 400, 400)));
+    output.write(thumbnail_names[1], encodePicture(thumbnailOf(preview, 800, 480)));
   }
 
  private:
@@ -85,13 +89,43 @@ class Sl1Slices : public ResinSlices {
   }
 };
 
+KeyValues valuesOf(const StackInput& files, const char* name) {
+  return KeyValues(files.read(name, most_configuration_bytes), "'" + files.shown(name) + "'");
+}
+
+/// Tells where the configurations of the job and of the slicer contradict each other.
+void checkSl1(const StackInput& files, const DescribedStack& /*stack*/,
+              std::span<const std::uint64_t> /*voxels*/, Findings& findings) {
+  const KeyValues job = valuesOf(files, job_name);
+  const KeyValues slicer = valuesOf(files, slicer_name);
+  using Severity = Finding::Severity;
+  const auto compare = [&](const char* key, const char* other, const char* id, Severity severity,
+                           const char* what) {
+    const auto a = slicer.find(key);
+    const auto b = job.find(other);
+    if (!a || !b || *a == *b) return;
+    constexpr double most = 1e9;
+    constexpr double tolerance = 1e-6;
+    if (std::abs(slicer.number(key, 0, most) - job.number(other, 0, most)) <= tolerance) return;
+    findings.add(
+        {id, severity,
+         std::string(key) + " is " + *a + ", and " + other + " of " + job_name + " is " + *b + what,
+         files.shown(slicer_name)});
+  };
+  constexpr const char* again = "; make the stack again";
+  compare("layer_height", "layerHeight", "layer-height", Severity::error, again);
+  compare("initial_layer_height", "layerHeight", "layer-height", Severity::warning,
+          "; the lowest layer has another height than the others");
+  compare("exposure_time", "expTime", "exposure", Severity::warning, again);
+  compare("initial_exposure_time", "expTimeFirst", "exposure", Severity::warning, again);
+  compare("faded_layers", "numFade", "exposure", Severity::warning, again);
+  tellMissingPictures(files, thumbnail_names, findings);
+}
+
 std::optional<DescribedStack> describeSl1(const StackInput& files) {
   if (!files.contains(job_name) || !files.contains(slicer_name)) return std::nullopt;
-  const auto valuesOf = [&](const char* name) {
-    return KeyValues(files.read(name, most_configuration_bytes), "'" + files.shown(name) + "'");
-  };
-  const KeyValues job = valuesOf(job_name);
-  const KeyValues slicer = valuesOf(slicer_name);
+  const KeyValues job = valuesOf(files, job_name);
+  const KeyValues slicer = valuesOf(files, slicer_name);
   constexpr int most = 1 << 24;
   constexpr double longest_mm = 1e5;
   ContainerContents contents;
@@ -127,6 +161,7 @@ const SliceFormat sl1{.name = "sl1",
                       .bytes_per_leaf = 80,
                       .container_ending = ".sl1",
                       .describe = describeSl1,
+                      .check = checkSl1,
                       .names = &sl1_names,
                       .shows_display = true};
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "io/image/size_check.h"
+#include "io/stack/findings.h"
 #include "io/stack/manifest.h"
 #include "io/stack/stack_files.h"
 #include "vdbdither/engine/options.h"
@@ -132,6 +133,11 @@ struct SliceFormat {
   /// Returns what a container says of itself, or nothing if its configuration is not among `files`.
   /// Throws DataError.
   std::optional<DescribedStack> (*describe)(const StackInput& files) = nullptr;
+  /// Tells where a container contradicts itself, besides its slices. Throws DataError where its
+  /// configuration cannot be read.
+  /// @param voxels  of each material, as the slices have them
+  void (*check)(const StackInput& files, const DescribedStack& stack,
+                std::span<const std::uint64_t> voxels, Findings& findings) = nullptr;
   /// The names that the format prescribes; null where the user chooses them.
   const SliceNames* names = nullptr;
   /// Whether a slice shows the whole display of the printer, mirrored as the profile says.

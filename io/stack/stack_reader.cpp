@@ -6,20 +6,13 @@
 #include <utility>
 
 #include "io/file/digest.h"
-#include "io/image/png_spans.h"
+#include "io/stack/pixel_meanings.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
 namespace {
-
-std::string colourText(std::uint32_t colour) {
-  std::string text;
-  for (int channel = 0; channel < 4; ++channel)
-    text += (channel ? "," : "") + std::to_string(colour >> 8 * channel & 255);
-  return text;
-}
 
 /// Puts `value` where `mask` is not 0. Returns where something else is already: the row, or -1.
 int overlay(SpanImage& image, const SpanImage& mask, std::uint32_t value) {
@@ -59,7 +52,12 @@ StackReader::StackReader(const std::filesystem::path& path, EditedStack edited,
   indexSlices();
   checkFiles();
   if (!input_.described()) checkForOthers();
-  meanings_ = meaningsOfPixels();
+  meanings_ = meaningsOfPixels(manifest_, [&](std::uint32_t material, std::uint32_t other) {
+    throw DataError(
+        sameColourText(manifest_, material, other) +
+        "; make the stack with slice-export --format " +
+        sliceFormatNames([](const SliceFormat& format) { return format.keepsMaterials(); }));
+  });
 }
 
 void StackReader::tellChange(const std::string& change) const {
@@ -142,41 +140,6 @@ void StackReader::checkForOthers() const {
       return;
     }
   }
-}
-
-std::map<std::uint32_t, std::uint32_t> StackReader::meaningsOfPixels() const {
-  const MaterialTable& materials = manifest_.materials;
-  std::map<std::uint32_t, std::uint32_t> meanings;
-  switch (format_->pixel) {
-    case SlicePixel::colour:
-      meanings[rgba(manifest_.background)] = 0;
-      for (std::uint32_t i = 1; i <= materials.size(); ++i) {
-        const Material& material = materials[i - 1];
-        const auto [place, is_new] = meanings.try_emplace(rgba(material.rgba), i);
-        if (!is_new) {
-          throw DataError(
-              "the material '" + material.name + "' has the colour of " +
-              (place->second == 0 ? "the background"
-                                  : "'" + materials[place->second - 1].name + "'") +
-              "; make the stack with slice-export --format " +
-              sliceFormatNames([](const SliceFormat& other) { return other.keepsMaterials(); }));
-        }
-      }
-      break;
-    case SlicePixel::palette:
-    case SlicePixel::index:
-      for (std::uint32_t i = 0; i <= materials.size(); ++i) meanings[i] = i;
-      break;
-    case SlicePixel::one_material:
-    case SlicePixel::printed:
-      if (format_->decodes_colours) {
-        meanings = {{rgba(0, 0, 0), 0}, {rgba(255, 255, 255), 1}};
-      } else {
-        meanings = {{0, 0}, {1, 1}};
-      }
-      break;
-  }
-  return meanings;
 }
 
 SpanImage StackReader::layer(int z) const {

@@ -38,7 +38,6 @@ class StackReader {
   void checkForOthers() const;
   /// Refuses a change of the stack, or warns of it where changes are taken.
   void tellChange(const std::string& change) const;
-  [[nodiscard]] std::map<std::uint32_t, std::uint32_t> meaningsOfPixels() const;
   [[nodiscard]] const Manifest::Slice* find(int z, const std::string& material) const;
   /// The names of the materials with files of their own, or one empty name.
   [[nodiscard]] std::vector<std::string> filesOfLayer() const;

@@ -2,12 +2,15 @@
 // the format by uv3dp and the reader of UVtools.
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include <nlohmann/json.hpp>
 
 #include "io/image/png_decoder.h"
 #include "io/stack/resin_slices.h"
 #include "vdbdither/engine/json_text.h"
+#include "vdbdither/engine/option_values.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/words.h"
 
@@ -22,6 +25,7 @@ constexpr int number_digits = 8;
 /// X and Y are stored in 16 bits.
 constexpr int widest = 65535;
 constexpr const char* folder = "slice/";
+constexpr std::array<const char*, 2> preview_names{"preview/tiny.png", "preview/huge.png"};
 const SliceNames uvj_names{"", number_digits, 0};
 
 ordered_json exposure(double seconds) {
@@ -69,8 +73,8 @@ class UvjSlices : public ResinSlices {
            {"Exposure", i < bottom_layers ? bottom : exposure(exposureSeconds())}});
     }
     writeText(output, configuration_name, jsonText(json, 1) + "\n");
-    output.write("preview/tiny.png", encodePicture(thumbnailOf(preview, 400, 400)));
-    output.write("preview/huge.png", encodePicture(thumbnailOf(preview, 800, 480)));
+    output.write(preview_names[0], encodePicture(thumbnailOf(preview, 400, 400)));
+    output.write(preview_names[1], encodePicture(thumbnailOf(preview, 800, 480)));
   }
 };
 
@@ -82,11 +86,47 @@ double numberAt(const ordered_json& json, const char* path, const std::string& s
   return json[pointer].get<double>();
 }
 
+ordered_json configurationOf(const StackInput& files) {
+  const std::vector<std::uint8_t> bytes = files.read(configuration_name, most_configuration_bytes);
+  return parsedJson({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+/// Tells where the list of layers contradicts the size.
+void checkUvj(const StackInput& files, const DescribedStack& stack,
+              std::span<const std::uint64_t> /*voxels*/, Findings& findings) {
+  const std::string file = files.shown(configuration_name);
+  const ordered_json json = configurationOf(files);
+  const ordered_json& layers = json["Layers"];
+  const auto count = static_cast<std::size_t>(stack.manifest.layers.size());
+  if (!layers.is_array() || layers.size() != count) {
+    findings.error("layer-list",
+                   "Layers lists " + std::to_string(layers.is_array() ? layers.size() : 0) +
+                       " layers, and Size says " + std::to_string(count) + "; make the stack again",
+                   file);
+  }
+  const double layer_mm = stack.manifest.lattice.pitch_mm.z();
+  for (std::size_t i = 0; layers.is_array() && i < layers.size(); ++i) {
+    const double expected_mm = static_cast<double>(i + 1) * layer_mm;
+    const ordered_json* z = nullptr;
+    if (layers[i].is_object() && layers[i].contains("Z")) z = &layers[i]["Z"];
+    if (z != nullptr && z->is_number() &&
+        std::abs(z->get<double>() - expected_mm) <= 0.01 * layer_mm + 1e-6 * expected_mm)
+      continue;
+    constexpr double micrometres = 1e3;
+    findings.add({"layer-height", Finding::Severity::error,
+                  "its Z in Layers is not " +
+                      shortestText(std::round(expected_mm * micrometres) / micrometres) +
+                      " mm, as layers of " + shortestText(layer_mm) +
+                      " mm make it; make the stack again",
+                  file, static_cast<int>(i)});
+  }
+  tellMissingPictures(files, preview_names, findings);
+}
+
 std::optional<DescribedStack> describeUvj(const StackInput& files) {
   if (!files.contains(configuration_name)) return std::nullopt;
   const std::string shown = "'" + files.shown(configuration_name) + "'";
-  const std::vector<std::uint8_t> bytes = files.read(configuration_name, most_configuration_bytes);
-  const ordered_json json = parsedJson({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const ordered_json json = configurationOf(files);
   // Others call their settings so too.
   if (!json.is_object() || !json.contains("Properties") || !json.contains("Layers"))
     return std::nullopt;
@@ -133,6 +173,7 @@ const SliceFormat uvj{.name = "uvj",
                       .bytes_per_leaf = 80,
                       .container_ending = ".uvj",
                       .describe = describeUvj,
+                      .check = checkUvj,
                       .names = &uvj_names,
                       .shows_display = true};
 

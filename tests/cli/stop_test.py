@@ -57,6 +57,7 @@ RUNS = {
     "slice-import": lambda radius: ("slice-import", f"stack{radius}", "-o", "out.vdb"),
     "ssim": lambda radius: ("ssim", f"picture{radius}.png", f"picture{radius}.png", "--maps", "out"),
     "stats": sink("stats"),
+    "verify": lambda radius: ("verify", f"stack{radius}", "--against", f"solid{radius}.vdb"),
     "write": lambda radius: ("write", "-i", f"surface{radius}.vdb", "out.vdb"),
 }
 

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <bit>
 #include <functional>
-#include <numeric>
 #include <span>
 #include <utility>
+
+#include "ops/kernels/measure/touching_spans.h"
 
 namespace vdbdither {
 
@@ -35,41 +36,6 @@ void forEachSpan(const std::uint64_t* row, int words, bool flip, const Visit& vi
     }
   }
   if (begin >= 0) visit(begin, words * word_bits);
-}
-
-/// Disjoint sets of numbers (union-find).
-class Sets {
- public:
-  explicit Sets(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0U);
-  }
-  std::uint32_t find(std::uint32_t n) {
-    while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
-    return n;
-  }
-  /// The lower number represents both.
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    if (a != b) parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
-
-/// Calls join(a, b) for the touching spans of two rows; `aside` is 1 if corners touch.
-template <typename Span, typename Join>
-void forEachTouching(std::span<const Span> a, std::span<const Span> b, int aside,
-                     const Join& join) {
-  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
-    if (a[i].begin < b[j].end + aside && b[j].begin < a[i].end + aside) join(i, j);
-    if (a[i].end < b[j].end) {
-      ++i;
-    } else {
-      ++j;
-    }
-  }
 }
 
 }  // namespace
@@ -116,7 +82,7 @@ void VoxelComponents::addLayer(const BitLayer& layer) {
 void VoxelComponents::addSpans(Pieces& pieces, std::vector<Span> spans,
                                std::vector<std::size_t> rows) const {
   const auto before = static_cast<std::uint32_t>(pieces.open.size());
-  Sets sets(before + spans.size());
+  DisjointSets sets(before + spans.size());
   const int reach = pieces.diagonal ? 1 : 0;
   const auto rowOf = [](const std::vector<Span>& of, const std::vector<std::size_t>& begins,
                         int row) -> std::span<const Span> {
