@@ -44,10 +44,11 @@ using Severity = Finding::Severity;
 /// Layers that are held together.
 constexpr int batch = 16;
 
-// Where smaller, islands and cups are the grain of dithering: the first are narrower than the tip
-// of a support.
+// Where smaller, islands, cups and cavities are the grain of dithering: the first are narrower than
+// the tip of a support.
 constexpr double least_island_mm2 = 0.04;
 constexpr double least_cup_mm3 = 1;
+constexpr double least_cavity_mm3 = 0.001;
 
 std::string rounded(double value) {
   std::array<char, 32> text{};
@@ -249,7 +250,10 @@ class Verify : public Tool {
     if (kind != "jetting")
       tellIslands(found, kind == "resin" ? Severity::error : Severity::warning);
     if (found.cavities.count > 0) {
-      tellTogether("cavity", found.cavities,
+      const double largest_mm3 =
+          static_cast<double>(found.cavities.largest[0].voxels) * voxelMl() * 1000;
+      tellTogether("cavity", largest_mm3 < least_cavity_mm3 ? Severity::note : Severity::warning,
+                   found.cavities,
                    counted(found.cavities.count, "closed cavity", "closed cavities") + ", " +
                        ml(found.cavities.voxels) + " in all, the largest one of " +
                        counted(found.cavities.largest[0].voxels, "voxel") +
@@ -262,7 +266,7 @@ class Verify : public Tool {
       });
     }
     if (found.specks.count > 0) {
-      tellTogether("speck", found.specks,
+      tellTogether("speck", Severity::note, found.specks,
                    counted(found.specks.count, "voxel") +
                        (found.specks.count == 1 ? " touches no other, here"
                                                 : " touch no others, the first one here") +
@@ -281,7 +285,7 @@ class Verify : public Tool {
     });
     const Regions& small = found.small_islands;
     if (small.count > 0) {
-      tellTogether("small-island", small,
+      tellTogether("small-island", Severity::note, small,
                    counted(small.count, "island") + " of less than " + rounded(least_island_mm2) +
                        " mm2 with nothing below, the largest one of " +
                        mm2(small.largest[0].voxels) +
@@ -289,11 +293,12 @@ class Verify : public Tool {
     }
   }
 
-  /// Adds all regions of a kind as one warning, at the place of the largest one.
-  void tellTogether(const std::string& id, const Regions& regions, const std::string& text) {
+  /// Adds all regions of a kind as one finding, at the place of the largest one.
+  void tellTogether(const std::string& id, Severity severity, const Regions& regions,
+                    const std::string& text) {
     const Region& largest = regions.largest[0];
     findings_.add({id,
-                   Severity::warning,
+                   severity,
                    text,
                    stack_->shown(largest.layer),
                    stack_->numberOf(largest.layer),
@@ -494,9 +499,8 @@ std::string Verify::inJson() const {
                        {"findings", ordered_json::array()},
                        {"left_out", ordered_json::object()}};
   for (const Finding& finding : findings_.kept()) {
-    ordered_json entry = {{"id", finding.id},
-                          {"severity", finding.severity == Severity::error ? "error" : "warning"},
-                          {"text", finding.text}};
+    ordered_json entry = {
+        {"id", finding.id}, {"severity", nameOf(finding.severity)}, {"text", finding.text}};
     if (!finding.file.empty()) entry["file"] = finding.file;
     if (finding.layer) entry["layer"] = *finding.layer;
     if (finding.pixel) entry["pixel"] = *finding.pixel;

@@ -6,8 +6,13 @@
 
 namespace vdbdither {
 
+void Findings::count(Finding::Severity severity, std::uint64_t number) {
+  if (severity == Finding::Severity::error) errors_ += number;
+  if (severity == Finding::Severity::warning) warnings_ += number;
+}
+
 void Findings::add(Finding finding) {
-  ++(finding.severity == Finding::Severity::error ? errors_ : warnings_);
+  count(finding.severity, 1);
   Kind& kind = kinds_[finding.id];
   if (kind.all++ == 0) order_.push_back(finding.id);
   if (kind.kept.size() < most_of_kind) kind.kept.push_back(std::move(finding));
@@ -23,7 +28,7 @@ void Findings::warning(std::string_view id, std::string text, std::string file) 
 
 void Findings::leaveOut(std::string_view id, Finding::Severity severity, std::uint64_t count) {
   if (count == 0) return;
-  (severity == Finding::Severity::error ? errors_ : warnings_) += count;
+  this->count(severity, count);
   const auto [kind, is_new] = kinds_.try_emplace(std::string(id));
   if (is_new) order_.emplace_back(id);
   kind->second.all += count;
@@ -53,6 +58,18 @@ std::string counted(std::uint64_t number, const std::string& one, const std::str
   return grouped(number) + " " + (number == 1 ? one : several.empty() ? one + "s" : several);
 }
 
+std::string_view nameOf(Finding::Severity severity) {
+  switch (severity) {
+    case Finding::Severity::error:
+      return "error";
+    case Finding::Severity::warning:
+      return "warning";
+    case Finding::Severity::note:
+      break;
+  }
+  return "note";
+}
+
 std::string textOf(const Finding& finding) {
   std::string place;
   const auto part = [&](const std::string& text) { place += (place.empty() ? "" : ", ") + text; };
@@ -62,7 +79,7 @@ std::string textOf(const Finding& finding) {
     part("column " + std::to_string((*finding.pixel)[0]));
     part("row " + std::to_string((*finding.pixel)[1]));
   }
-  return printable((finding.severity == Finding::Severity::error ? "error: " : "warning: ") +
+  return printable(std::string(nameOf(finding.severity)) + ": " +
                    (place.empty() ? "" : place + ": ") + finding.text) +
          " [" + finding.id + "]";
 }

@@ -13,7 +13,7 @@ namespace vdbdither {
 
 /// What a check of a stack of slices found: one fault at one place.
 struct Finding {
-  enum class Severity { error, warning };
+  enum class Severity { error, warning, note };
 
   std::string id;  ///< of its kind, in kebab-case; docs/verify.md explains each
   Severity severity = Severity::error;
@@ -44,6 +44,8 @@ class Findings {
   [[nodiscard]] std::uint64_t warnings() const { return warnings_; }
 
  private:
+  void count(Finding::Severity severity, std::uint64_t number);
+
   struct Kind {
     std::vector<Finding> kept;
     std::uint64_t all = 0;
@@ -59,6 +61,9 @@ std::string grouped(std::uint64_t number);
 
 /// Returns `1 slice`, `1,234 slices`.
 std::string counted(std::uint64_t number, const std::string& one, const std::string& several = {});
+
+/// Returns `error`, `warning` or `note`.
+std::string_view nameOf(Finding::Severity severity);
 
 /// Returns the finding in one line: severity, place, text and kind.
 std::string textOf(const Finding& finding);

@@ -324,19 +324,19 @@ class Verify(ProgramTest):
     def test_islands_are_lost_in_resin(self):
         top = [*self.BASE[:4], "." + "w" * 12 + "..www..", *self.BASE[5:9], "." + "w" * 12 + "..wwww.", "." + "w" * 12 + "..wwww.", "." * 20]
         layers = [self.BASE, top, top]
-        findings = self.drawn(layers, expected={("error", "island"): 1, ("warning", "small-island"): 1})
+        findings = self.drawn(layers, expected={("error", "island"): 1, ("note", "small-island"): 1})
         self.assertEqual((findings[0]["layer"], findings[0]["pixel"], findings[0]["count"]), (1, [15, 9], 8))
         self.assertIn("an island of 0.08 mm2 ", findings[0]["text"])
         self.drawn(layers, expected={}, mode="RGBA", printer="jet.json")
 
-    def test_specks_cavities_and_empty_layers_are_warnings(self):
+    def test_specks_cavities_and_empty_layers_are_told(self):
         hollow = [*self.BASE[:5], ".www..wwwwwww......", *self.BASE[6:]]
         hollow[5] = ".www..wwwwwww" + "." * 7
         speck = [*self.BASE[:5], "." + "w" * 12 + "....w..", *self.BASE[6:]]
         [cavity] = self.drawn([self.BASE, hollow, hollow, self.BASE], expected={("warning", "cavity"): 1})
         self.assertEqual((cavity["layer"], cavity["pixel"], cavity["count"]), (1, [4, 5], 1))
         self.assertIn("1 closed cavity, 4e-06 ml in all, the largest one of 4 voxels here", cavity["text"])
-        [found] = self.drawn([self.BASE, speck, self.BASE], expected={("warning", "speck"): 1})
+        [found] = self.drawn([self.BASE, speck, self.BASE], expected={("note", "speck"): 1})
         self.assertEqual((found["layer"], found["pixel"]), (1, [17, 5]))
         blank = ["." * 20] * 12
         empty = self.drawn([self.BASE, blank, blank, self.BASE], expected={("warning", "empty-layers"): 1, ("error", "island"): 1})[0]

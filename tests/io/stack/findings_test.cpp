@@ -15,6 +15,7 @@ TEST(Findings, KeepsTheFirstOfEachKindAndCountsTheRest) {
     if (i < 2) findings.warning("b", std::to_string(i));
   }
   findings.leaveOut("b", Finding::Severity::warning, 7);
+  findings.leaveOut("c", Finding::Severity::note, 0);
   std::vector<std::string> kept;
   for (const Finding& finding : findings.kept()) kept.push_back(finding.id + finding.text);
   EXPECT_THAT(kept,
@@ -24,12 +25,16 @@ TEST(Findings, KeepsTheFirstOfEachKindAndCountsTheRest) {
   EXPECT_EQ(findings.leftOut("c"), 0U);
   EXPECT_EQ(findings.errors(), 15U);
   EXPECT_EQ(findings.warnings(), 9U);
+  findings.add({"d", Finding::Severity::note, "is small"});
+  EXPECT_EQ(findings.kept().size(), 13U);
+  EXPECT_EQ(findings.warnings(), 9U);
 }
 
 TEST(Findings, TellWhereTheyAre) {
   EXPECT_EQ(textOf({"a-b", Finding::Severity::error, "is wrong; mend it", "x/s1.png", 4, {{5, 6}}}),
             "error: 'x/s1.png', layer 4, column 5, row 6: is wrong; mend it [a-b]");
   EXPECT_EQ(textOf({"a", Finding::Severity::warning, "is odd"}), "warning: is odd [a]");
+  EXPECT_EQ(textOf({"a", Finding::Severity::note, "is small"}), "note: is small [a]");
   EXPECT_EQ(textOf({"a", Finding::Severity::warning, "is\nodd\x1b[2J", "\x07"}),
             "warning: '\\x07': is\\nodd\\x1b[2J [a]");
 }
