@@ -126,7 +126,6 @@ class Reference {
 
   struct Counts {
     std::multimap<int, std::uint64_t> islands, specks, cavities, cups;  ///< voxels by lowest layer
-    friend bool operator==(const Counts&, const Counts&) = default;
   };
 
   Counts counts() {
