@@ -25,9 +25,8 @@ vdbdither mesh2sdf "$mesh" --colour --printer stratasys-j750-27um ! dither ! mat
 vdbdither slice-export -i "$folder/inks.vdb" "$folder/part.gcvf" --overwrite
 vdbdither verify "$folder/part.gcvf" --against "$folder/inks.vdb"
 
-# The same voxels as a volume, in the surface of the part.
-vdbdither mesh2sdf "$mesh" --printer stratasys-j750-27um ! mesh-export "$folder/surface.stl" --overwrite
-vdbdither slice-export -i "$folder/inks.vdb" "$folder/part.3mf" --3mf-mesh "$folder/surface.stl" --overwrite
+# The same voxels as a volume within the mesh.
+vdbdither slice-export -i "$folder/inks.vdb" "$folder/part.3mf" --3mf-mesh "$mesh" --overwrite
 vdbdither verify "$folder/part.3mf" --against "$folder/inks.vdb"
 
 # The shape alone, on a display with pixels of 14 x 19 µm.

@@ -1,7 +1,7 @@
 // 3MF with a volume: images of the materials, by the 3MF Core Specification 1.3 and the 3MF
 // Volumetric & Implicit Extensions 1.0. Every material is an `image3d` of its own, whose values are
 // the shares of a `composite`. The shape is a mesh of the user, which every consumer can print, or
-// a `levelset` of the voxels, which one must understand.
+// on request a `levelset` of the voxels, which few understand.
 
 #include <cmath>
 #include <sstream>
@@ -49,15 +49,23 @@ std::string hexColour(const std::array<std::uint8_t, 4>& colour) {
 class VolumeEncoder : public SliceEncoder {
  public:
   void declare(Options& options) override {
-    options.file("3mf-mesh", mesh_, "MESH",
-                 "The surface of the part in 3mf, in the same place, as mesh-export writes it: any "
-                 "program can open it. By default the voxels themselves are the shape, which needs "
-                 "a program that knows level sets");
+    options.file(
+        "3mf-mesh", mesh_, "MESH",
+        "The surface of the part in 3mf, where mesh2sdf placed it: the mesh itself, or one "
+        "of mesh-export");
+    options.flag("3mf-level-set", is_level_set_,
+                 "Takes the voxels as the shape in 3mf, in place of a mesh: a level set, which few "
+                 "programs read");
   }
 
   void plan(const Manifest& stack, const Grids& grids) override {
     SliceEncoder::plan(stack, grids);
-    if (!mesh_.empty()) shape_ = readMesh(mesh_, {});
+    if (mesh_.empty() != is_level_set_) {
+      throw UsageError(
+          "3mf: give either --3mf-mesh MESH, the surface of the part, or --3mf-level-set, which "
+          "takes the voxels as the shape");
+    }
+    if (!is_level_set_) shape_ = readMesh(mesh_, {});
   }
 
   [[nodiscard]] std::vector<SliceFile> encode(const SliceLayer& layer) const override {
@@ -170,12 +178,11 @@ class VolumeEncoder : public SliceEncoder {
     const std::size_t level_id = 2 + 2 * images;
     const std::size_t volume_id = level_id + 1;
     const std::size_t mesh_id = level_id + 2;
-    const bool is_level_set = mesh_.empty();
     const std::string to_image = transform(stack);
     std::ostringstream xml;
     xml << xml_head << "<model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"" << core_space
         << "\" xmlns:v=\"" << volumetric_space << "\""
-        << (is_level_set ? " requiredextensions=\"v\"" : "")
+        << (is_level_set_ ? " requiredextensions=\"v\"" : "")
         << ">\n <metadata name=\"Application\">vdbdither " << version << "</metadata>\n"
         << " <resources>\n  <basematerials id=\"1\">\n";
     for (const Material& material : stack.materials) {
@@ -195,7 +202,7 @@ class VolumeEncoder : public SliceEncoder {
           << "\" filter=\"nearest\" tilestyleu=\"clamp\" tilestylev=\"clamp\" "
              "tilestylew=\"clamp\"/>\n";
     }
-    if (is_level_set) {
+    if (is_level_set_) {
       // Inside of the shape the value is negative.
       xml << "  <v:functionfromimage3d id=\"" << level_id << "\" image3did=\""
           << imageId(images - 1)
@@ -209,15 +216,15 @@ class VolumeEncoder : public SliceEncoder {
     }
     xml << "   </v:composite>\n  </v:volumedata>\n  <object id=\"" << mesh_id
         << "\" type=\"model\">\n   <mesh"
-        << (is_level_set ? "" : " v:volumeid=\"" + std::to_string(volume_id) + "\"") << ">\n";
-    writeMesh(is_level_set ? boxOfSlices(stack.layers) : shape_, xml);
+        << (is_level_set_ ? "" : " v:volumeid=\"" + std::to_string(volume_id) + "\"") << ">\n";
+    writeMesh(is_level_set_ ? boxOfSlices(stack.layers) : shape_, xml);
     xml << "   </mesh>\n  </object>\n";
-    if (is_level_set) {
+    if (is_level_set_) {
       xml << "  <object id=\"" << mesh_id + 1 << "\" type=\"model\">\n   <v:levelset functionid=\""
           << level_id << "\" channel=\"red\" transform=\"" << to_image << "\" meshid=\"" << mesh_id
           << "\" meshbboxonly=\"true\" volumeid=\"" << volume_id << "\"/>\n  </object>\n";
     }
-    xml << " </resources>\n <build>\n  <item objectid=\"" << mesh_id + (is_level_set ? 1 : 0)
+    xml << " </resources>\n <build>\n  <item objectid=\"" << mesh_id + (is_level_set_ ? 1 : 0)
         << "\"/>\n </build>\n</model>\n";
     return xml.str();
   }
@@ -237,6 +244,7 @@ class VolumeEncoder : public SliceEncoder {
   }
 
   std::string mesh_;
+  bool is_level_set_ = false;
   Mesh shape_;
 };
 

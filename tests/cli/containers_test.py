@@ -35,8 +35,9 @@ class Containers(ProgramTest):
         run("mesh2sdf", "part.stl", "--printer", "stratasys-j750-27um", "!", "dither", "!", "material-assign", "--core", "VeroCyan", "--shell",
             "0.3mm:white", "-o", "jetted.vdb")
         run("mesh2sdf", "part.stl", "--printer", "small.json", "!", "dither", "-o", "cured.vdb")
-        for name in ("a.gcvf", "plain.zip", "level.3mf"):
+        for name in ("a.gcvf", "plain.zip"):
             run("slice-export", "-i", "jetted.vdb", name)
+        run("slice-export", "-i", "jetted.vdb", "level.3mf", "--3mf-level-set")
         run("slice-export", "-i", "jetted.vdb", "mesh.3mf", "--3mf-mesh", "part.stl")
         run("slice-export", "-i", "jetted.vdb", "--format", "objet", "bits")
         for name in ("a.sl1", "a.uvj"):
@@ -256,6 +257,9 @@ class Containers(ProgramTest):
 
         refuse("--format: the name of a sl1 ends with .sl1, that of other stacks does not; it is 'out'", "--format", "sl1", "out")
         refuse("--format: the name of a gcvf ends with .gcvf, that of other stacks does not; it is 'a.gcvf'", "--format", "png", "a.gcvf")
+        shape = "3mf: give either --3mf-mesh MESH, the surface of the part, or --3mf-level-set, which takes the voxels as the shape"
+        refuse(shape, "a.3mf")
+        refuse(shape, "a.3mf", "--3mf-level-set", "--3mf-mesh", self.made / "part.stl")
         refuse("--prefix: gcvf prescribes the names of its files; leave it out", "a.gcvf", "--prefix", "p")
 
 

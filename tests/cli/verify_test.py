@@ -26,7 +26,8 @@ RECIPES = {
     "drawn.vdb": ("slice-import", "drawn", "--printer", "jet.json", *PALETTE, "-o", "drawn.vdb"),
     "vat.vdb": ("slice-import", "drawn", "--printer", "vat.json", *BLACK, "!", "material-assign", "--material", "solid", "-o", "vat.vdb"),
     **{f"{kind}-out": ("slice-export", "-i", "drawn.vdb", f"{kind}-out", "--format", kind) for kind in ("png", "png1", "png8", "tiff", "exr", "objet")},
-    **{name: ("slice-export", "-i", "drawn.vdb", name) for name in ("out.zip", "out.gcvf", "out.3mf")},
+    **{name: ("slice-export", "-i", "drawn.vdb", name) for name in ("out.zip", "out.gcvf")},
+    "out.3mf": ("slice-export", "-i", "drawn.vdb", "out.3mf", "--3mf-level-set"),
     **{name: ("slice-export", "-i", "vat.vdb", name) for name in ("out.sl1", "out.uvj")},
 }
 
