@@ -50,12 +50,12 @@ class StagedOutput {
   /// the user will see it, also where `name` is no path below the folder or is written already.
   void write(const std::string& name, std::span<const std::uint8_t> bytes) const;
 
-  /// Gives it its name, in place of what had it before: at every moment the old one or the new one
-  /// is there, whole. (Where the file system cannot exchange folders, a run that is killed in this
-  /// moment leaves the old one for `putBack`.) Files that somebody else put into the old folder
-  /// since `checkFolder` stay in the folder. Throws DataError; a folder that could not take the
-  /// place of the old one is then kept under its name with `.new`. Throws
-  /// Interrupted if the run is to stop.
+  /// Gives it its name, in place of what had it before, once it is on the disk: at every moment the
+  /// old one or the new one is there, whole, also if the machine stops. (Where the file system
+  /// cannot exchange folders, a run that is killed in this moment leaves the old one for
+  /// `putBack`.) Files that somebody else put into the old folder since `checkFolder` stay in the
+  /// folder. Throws DataError; a folder that could not take the place of the old one is then kept
+  /// under its name with `.new`. Throws Interrupted if the run is to stop.
   void commit();
 
   /// Removes all outputs of the process that are not committed, and lets none be committed or

@@ -78,7 +78,7 @@ class Limits(ProgramTest):
                     self.assertEqual(said, "")
                     break
                 self.assertEqual((done.returncode, said.count("\n")), (1, 1), (arguments, megabytes, said))
-                self.assertRegex(said, r"\Avdbdither( [a-z0-9-]+)?: (out of memory; |cannot start a thread: |[^\n]* of memory and may use )")
+                self.assertRegex(said, r"\Avdbdither( [a-z0-9-]+)?: (out of memory; |cannot start a thread: |[^\n]* of memory and may use |[^\n]* bytes do not fit into memory; )")
                 self.assertEqual(self.listing(), before)
                 refused += 1
             self.assertEqual(done.returncode, 0)
