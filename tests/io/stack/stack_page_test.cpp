@@ -344,7 +344,7 @@ TEST_F(StackPages, NamesOfFilesEndNoElement) {
   EXPECT_THAT(read.element("stack"), Not(HasSubstr("<")));
   const std::string shown = "</script><script>alert(1)</script><!--\"'&\x1b[31m\\xff";
   EXPECT_EQ(read.json()["materials"][0]["name"], shown);
-  EXPECT_EQ(read.json()["history"], ordered_json());
+  EXPECT_FALSE(read.json().contains("history"));
   EXPECT_EQ(read.json()["stacks"][0]["history"][0], shown);
   EXPECT_EQ(read.json()["stacks"][0]["name"], shown);
   EXPECT_EQ(read.json()["printer"]["title"], "</script><b>");
