@@ -8,9 +8,9 @@
 #include <string_view>
 #include <vector>
 
+#include "io/file/xml_reader.h"
 #include "io/mesh/mesh_file.h"
 #include "io/mesh/threemf_model.h"
-#include "io/file/xml_reader.h"
 
 namespace vdbdither {
 

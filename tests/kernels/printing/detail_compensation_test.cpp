@@ -10,9 +10,9 @@
 
 #include "ops/kernels/leaf/simple_point.h"
 #include "ops/kernels/printing/gaussian_spread.h"
-#include "vdbdither/model/half_space_share.h"
 #include "ops/kernels/printing/normal_distribution.h"
 #include "tests/support/volumes.h"
+#include "vdbdither/model/half_space_share.h"
 
 namespace vdbdither {
 namespace {
