@@ -144,7 +144,7 @@ void planFrame(const FrameOptions& options, const openvdb::CoordBBox& part,
   const int over = static_cast<int>(pixels[0] % format.width_multiple);
   if (over > 0) layout.box.max().x() += format.width_multiple - over;
   constexpr std::int64_t widest = 1 << 24;
-  if (std::max(pixels[0], pixels[1]) + format.width_multiple > widest)
+  if (std::max(pixels[0], pixels[1]) + format.width_multiple - 1 > widest)
     throw UsageError("slices would be more than 16777216 voxels wide");
 }
 

@@ -1,6 +1,7 @@
 """Tests samples/paper: parts are closed meshes, and every method runs."""
 
 import importlib.util
+import json
 import struct
 import subprocess
 import sys
@@ -34,11 +35,15 @@ class Paper(ProgramTest):
     def test_every_method_prints(self):
         from methods import METHODS, PRINTER
         meshes.write_stl(self.folder / "part.stl", meshes.box((1, 1, 1)))
+        prints = set()
         for name, (refine, step) in METHODS.items():
             step = step.replace("--size 64", "--size 16")
             self.succeed("mesh2sdf", "part.stl", "--printer", PRINTER, *refine, "!", *step.split(), "-o", "solid.vdb",
                          "--overwrite", "-q")
-            self.assertGreater((self.folder / "solid.vdb").stat().st_size, 0, name)
+            counts = json.loads(self.succeed("stats", "-i", "solid.vdb", "--json"))["solid"]
+            self.assertAlmostEqual(1000 * counts["ml"], 1, delta=0.05, msg=name)
+            prints.add((counts["voxels"], counts["faces_mm2"]))
+        self.assertEqual(len(prints), len(METHODS), "every method makes its own voxels")
 
     def test_an_unknown_step_is_refused(self):
         done = subprocess.run([PAPER / "reproduce.sh", "figure"], capture_output=True, text=True, cwd=self.folder,

@@ -1,16 +1,21 @@
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <unistd.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/tools/Prune.h>
 
+#include "io/file/digest.h"
 #include "io/profile/printer_profile.h"
 #include "io/vdb/vdb.h"
+#include "ops/kernels/mask/mask_tile.h"
 #include "ops/kernels/mask/threshold_mask.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/filters.h"
+#include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -52,6 +57,17 @@ TEST(Dither, MakesTheSameOfSlabsOfAnyHeightWhateverLiesBeyondItsReach) {
       }
     }
   }
+}
+
+TEST(Dither, AtTheVoxelWithoutAGuardReadsTheLayersOfItsOwnGradient) {
+  const Schema schema = ballOn(mimaki);
+  const auto dither = test::filterCalled(
+      "dither", {"--mask", "white", "--at", "voxel", "--guard", "none", "--amplitude", "8"});
+  const auto solid =
+      openvdb::gridConstPtrCast<BoolGrid>(test::runWhole(*dither, schema).at("solid"));
+  EXPECT_EQ(test::differences(test::solidOfSlabs(*dither, schema, 8, mimaki.box),
+                              test::dense(*solid, mimaki.box)),
+            0);
 }
 
 TEST(Dither, LeavesItsInputUntouched) {
@@ -206,6 +222,46 @@ TEST_F(MaskFile, RefusesWhatIsNoVdbFile) {
               ThrowsMessage<DataError>(AllOf(HasSubstr("--mask: "), HasSubstr(path_.string()))));
 }
 
+/// Sets the folder of the cache for a test.
+class CacheFolder {
+ public:
+  CacheFolder() {
+    if (const char* before = std::getenv(variable)) before_ = before;
+    setenv(variable, folder_.path().c_str(), 1);
+  }
+  CacheFolder(const CacheFolder&) = delete;
+  CacheFolder& operator=(const CacheFolder&) = delete;
+  ~CacheFolder() { before_ ? setenv(variable, before_->c_str(), 1) : unsetenv(variable); }
+
+ private:
+  static constexpr const char* variable = "XDG_CACHE_HOME";
+  test::ScratchFolder folder_;
+  std::optional<std::string> before_;
+};
+
+TEST_F(MaskFile, OfEveryJobOfAProcessIsItsOwnMadeOrKept) {
+  const CacheFolder cache;
+  const Schema schema = ballOn(mimaki);
+  const auto solid = [&](const std::vector<std::string>& options) {
+    return test::dense(
+        *openvdb::gridConstPtrCast<BoolGrid>(
+            test::runWhole(*test::filterCalled("dither", options), schema).at("solid")),
+        mimaki.box);
+  };
+  for (const char* run : {"made", "kept"}) {
+    for (const int size : {6, 8}) {
+      for (const int seed : {1, 2}) {
+        VoidAndCluster settings = defaultMask();
+        settings.size = Coord(size);
+        settings.seed = static_cast<std::uint64_t>(seed);
+        const test::Voxels expected = solid({"--mask", write(maskOf(settings))});
+        EXPECT_EQ(solid({"--size", std::to_string(size), "--seed", std::to_string(seed)}), expected)
+            << run << " " << size << " " << seed;
+      }
+    }
+  }
+}
+
 TEST(Dither, RefusesASurfaceThatDoesNotReachFarEnough) {
   const Schema thin = test::schemaOf(mimaki, {{"surface", FloatGrid::create(0.09F)}});
   EXPECT_THAT(
@@ -315,6 +371,55 @@ TEST(Dither, DiffusionMakesTheSameOfSlabsOfAnyHeight) {
       }
     }
   }
+}
+
+/// The lattices of a Mimaki 3DUJ-553 and a Stratasys J750, around a small ball.
+std::vector<Lattice> lattices() {
+  return {test::latticeAround({0.042, 0.084, 0.022}, Vec3d(0.4), 0.3),
+          test::latticeAround({0.04233, 0.08467, 0.027}, Vec3d(0.4), 0.3)};
+}
+
+Schema smallBallOn(const Lattice& lattice) {
+  return test::schemaOf(
+      lattice,
+      {{"surface", test::sampled(test::sphere({0.011, 0.007, -0.013}, 0.4), lattice, 0.2)}});
+}
+
+TEST(Dither, DiffusionMakesTheSameOfLowSlabsForAShortAndALongBlur) {
+  // Its sides are steep: what is decided in a layer matters far above and below.
+  const auto part = test::box({0.011, 0.007, -0.013}, {0.2, 0.2, 0.6}, {4, -3, 20});
+  for (const Vec3d& pitch_mm : {Vec3d(0.042, 0.084, 0.022), Vec3d(0.04233, 0.08467, 0.027)}) {
+    const Lattice lattice = test::latticeAround(pitch_mm, {0.3, 0.3, 0.65}, 0.1);
+    const Schema schema = test::schemaOf(lattice, {{"surface", test::sampled(part, lattice, 0.2)}});
+    for (const std::string spread : {"10um", "120um"}) {
+      for (const std::string guard : {"walls", "none"}) {
+        const auto dither = test::filterCalled("dither", {"--spread", spread, "--guard", guard});
+        const auto solid =
+            openvdb::gridConstPtrCast<BoolGrid>(test::runWhole(*dither, schema).at("solid"));
+        EXPECT_EQ(test::differences(test::solidOfSlabs(*dither, schema, 8, lattice.box),
+                                    test::dense(*solid, lattice.box)),
+                  0)
+            << spread << " " << guard << " " << lattice.pitch_mm;
+      }
+    }
+  }
+}
+
+/// Only a change of the default that is meant to change prints may change these digests. To renew
+/// one, copy it from the failure; the change belongs into CHANGELOG.md.
+TEST(Dither, ByDefaultMakesTheVoxelsThatItAlwaysMade) {
+  std::vector<std::string> digests;
+  for (const Lattice& lattice : lattices()) {
+    const auto solid = openvdb::gridConstPtrCast<BoolGrid>(
+        test::runWhole(*test::filterCalled("dither"), smallBallOn(lattice)).at("solid"));
+    Digest digest;
+    for (auto voxel = lattice.box.begin(); voxel; ++voxel) {
+      const char printed = solid->tree().getValue(*voxel) ? 1 : 0;
+      digest.update(&printed, 1);
+    }
+    digests.push_back(hexText(digest.finish()).substr(0, 16));
+  }
+  EXPECT_THAT(digests, testing::ElementsAre("63d6d11d14225fd2", "a9ed00330d8ff89a"));
 }
 
 test::Voxels solidBy(const std::vector<std::string>& options) {

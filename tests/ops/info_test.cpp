@@ -56,6 +56,20 @@ TEST(Info, TellsGridsLatticeMaterialsAndHistory) {
             "          by hand\n");
 }
 
+TEST(Info, TellsTheOriginAndTheBoxOfTheLattice) {
+  Schema schema;
+  schema.lattice = {{0.5, 0.25, 2}, {0.25, -0.5, 3}, CoordBBox(Coord(-1, -2, -3), Coord(2, 0, 1))};
+  EXPECT_EQ(told(schema, {}, {}),
+            "lattice   0.5 x 0.25 x 2 mm from 0.25 -0.5 3 mm\n"
+            "box       4 x 3 x 5 voxels, 2 x 0.75 x 10 mm, from -1 -2 -3 to 2 0 1\n");
+  const json found = json::parse(told(schema, {}, {"--json"}));
+  EXPECT_EQ(found["lattice"]["pitch_mm"], json::parse("[0.5, 0.25, 2.0]"));
+  EXPECT_EQ(found["lattice"]["origin_mm"], json::parse("[0.25, -0.5, 3.0]"));
+  EXPECT_EQ(found["lattice"]["min"], json::parse("[-1, -2, -3]"));
+  EXPECT_EQ(found["lattice"]["max"], json::parse("[2, 0, 1]"));
+  EXPECT_EQ(found["layers"], 5);
+}
+
 TEST(Info, TellsTheSameForAnySlabs) {
   auto solid = openvdb::BoolGrid::create(false);
   solid->fill(CoordBBox(Coord(-3, 2, 5), Coord(100, 120, 99)), true, true);

@@ -1,14 +1,17 @@
 #include <cmath>
 #include <fstream>
 #include <memory>
+#include <numbers>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "io/mesh/mesh_reader.h"
+#include "ops/kernels/mesh/taubin.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/filters.h"
+#include "tests/support/mesh_checks.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/shapes.h"
@@ -148,8 +151,14 @@ TEST_F(Measure, SmoothingComesBeforeMeasuring) {
   const MeasuringMesh smooth(more);
   smooth.run();
   EXPECT_EQ(nlohmann::json::parse(smooth.said.printed)["surface"]["smoothing"], 20);
-  EXPECT_NE(nlohmann::json::parse(smooth.said.printed)["surface"]["volume_mm3"],
-            nlohmann::json::parse(plain.said.printed)["surface"]["volume_mm3"]);
+  const auto volumeSaid = [](const MeasuringMesh& measuring) {
+    return nlohmann::json::parse(measuring.said.printed)["surface"]["volume_mm3"].get<double>();
+  };
+  Mesh sphere = test::sphereMesh({1, 1, 0.5}, 0.4, 20);
+  EXPECT_NEAR(volumeSaid(plain), test::volumeOf(sphere), 1e-6);
+  EXPECT_NEAR(volumeSaid(plain), 4 * std::numbers::pi / 3 * 0.4 * 0.4 * 0.4, 0.004);
+  vdbdither::smooth(sphere, {0.5, -0.53, 20});
+  EXPECT_NEAR(volumeSaid(smooth), test::volumeOf(sphere), 1e-6);
 }
 
 TEST_F(Measure, RefusesWhatCannotBeMeasured) {

@@ -1,6 +1,11 @@
 #include <fstream>
+#include <map>
 #include <memory>
 
+#include <ImathBox.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,6 +58,13 @@ std::vector<std::string> with(std::vector<std::string> words,
   return words;
 }
 
+/// Checks that an opaque pixel has this grey, to one.
+void expectGrey(std::uint32_t pixel, int grey) {
+  EXPECT_EQ(pixel >> 24, 255U);
+  for (const int channel : {0, 8, 16})
+    EXPECT_NEAR(static_cast<int>(pixel >> channel & 255), grey, 1) << channel;
+}
+
 TEST_F(Render, AMeshOfItsOwnIsDrawnWithoutAChain) {
   const RenderingMesh rendering(with({file("part.stl"), file("part.png")}, from_above));
   rendering.run();
@@ -86,6 +98,17 @@ TEST_F(Render, VoxelsAreDrawnAsTheyComeInSlabsOfAnyHeight) {
   }
   EXPECT_EQ(pictures[1], pictures[0]);
   EXPECT_EQ(pictures[2], pictures[0]);
+  Rendering(with({file("print.png"), "--frame", file("part.stl"), "--overwrite"}, from_above))
+      .run(schema);
+  const Picture picture = readPicture(scratch / "print.png");
+  ASSERT_EQ(std::pair(picture.width, picture.height), std::pair(36U, 26U));
+  // Pixel (8, 17) shows the part's origin; voxel centres lie at multiples of a pixel.
+  const auto pixel = [&](std::size_t x, std::size_t y) { return picture.pixels[36 * y + x]; };
+  expectGrey(pixel(18, 13), 203);
+  expectGrey(pixel(8, 17), 203);
+  EXPECT_EQ(pixel(6, 13), 0U);
+  EXPECT_EQ(pixel(18, 20), 0U);
+  EXPECT_EQ(pixel(29, 13), 0U);
 }
 
 TEST_F(Render, BlocksHaveNoSlopes) {
@@ -111,18 +134,48 @@ TEST_F(Render, AFrameMakesPicturesComparable) {
   RenderingMesh({file("part.stl"), file("part.png")}).run();
   RenderingMesh({file("small.stl"), file("framed.png"), "--frame", file("part.stl")}).run();
   RenderingMesh({file("small.stl"), file("own.png")}).run();
+  RenderingMesh(
+      with({file("small.stl"), file("above.png"), "--frame", file("part.stl")}, from_above))
+      .run();
   const Picture part = readPicture(scratch / "part.png");
   const Picture framed = readPicture(scratch / "framed.png");
   EXPECT_EQ(std::pair(framed.width, framed.height), std::pair(part.width, part.height));
   EXPECT_LT(readPicture(scratch / "own.png").width, part.width);
+  const Picture above = readPicture(scratch / "above.png");
+  ASSERT_EQ(std::pair(above.width, above.height), std::pair(36U, 26U));
+  // Of 0.1 mm, from 8 pixels beside the part of 2 x 1 mm on; the small box lies within 0.5 to 1 and
+  // 0.25 to 0.75 mm.
+  expectGrey(above.pixels[36 * 13 + 8 + 7], 203);
+  EXPECT_EQ(above.pixels[36 * 13 + 8 + 3], 0U);
+  EXPECT_EQ(above.pixels[36 * 13 + 8 + 12], 0U);
 }
 
 TEST_F(Render, AnExrHoldsTheLightTimesTheCover) {
-  RenderingMesh(with({file("part.stl"), file("part.exr")}, from_above)).run();
-  const std::vector<std::uint8_t> bytes = test::fileBytes(scratch / "part.exr");
-  ASSERT_GT(bytes.size(), 4U);
-  EXPECT_EQ((std::vector<std::uint8_t>{0x76, 0x2f, 0x31, 0x01}),
-            std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + 4));
+  // 1.95 mm are 19.5 of 20 pixels: a quarter of a pixel is free on either side.
+  scratch.write("narrow.stl", test::binaryStl(test::boxMesh({0, 0, 0}, {1.95, 1, 1})));
+  RenderingMesh(with({file("narrow.stl"), file("part.exr")}, from_above)).run();
+  Imf::InputFile exr((scratch / "part.exr").c_str());
+  const Imath::Box2i window = exr.header().dataWindow();
+  ASSERT_EQ(std::pair(window.max.x, window.max.y), std::pair(35, 25));
+  std::map<std::string, std::vector<float>> channels;
+  Imf::FrameBuffer buffer;
+  for (const char* name : {"A", "R", "G", "B"}) {
+    channels[name].assign(36 * 26, -1);
+    buffer.insert(
+        name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(channels[name].data()), 4, 4 * 36));
+  }
+  exr.setFrameBuffer(buffer);
+  exr.readPixels(0, 25);
+  const auto expectPixel = [&](std::size_t x, double cover, double tolerance) {
+    const std::size_t at = 36 * 13 + x;
+    EXPECT_NEAR(channels["A"][at], cover, tolerance) << x;
+    for (const char* name : {"R", "G", "B"})
+      EXPECT_NEAR(channels[name][at], 0.6 * channels["A"][at], 2e-3) << name << " " << x;
+  };
+  expectPixel(18, 1, 0);
+  expectPixel(8, 0.75, 0.1);
+  expectPixel(27, 0.75, 0.1);
+  expectPixel(6, 0, 0);
 }
 
 TEST_F(Render, RefusesWhatCannotBeDrawn) {

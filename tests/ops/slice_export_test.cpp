@@ -424,6 +424,25 @@ TEST(SliceExport, RefusesWhatItCannotSlice) {
               ThrowsMessage<UsageError>(HasSubstr("has 256 bytes; the maximum is 255")));
 }
 
+TEST(SliceExport, ATiffHasAtMost255Materials) {
+  const auto planning = [](std::size_t count) {
+    return [count] {
+      const test::ScratchFolder scratch;
+      Job job = smallJob();
+      MaterialTable materials;
+      for (std::size_t i = 0; i < count; ++i)
+        materials.push_back(
+            {"m" + std::to_string(i),
+             {1, static_cast<std::uint8_t>(i % 256), static_cast<std::uint8_t>(i / 256), 255}});
+      job.schema.metadata[materials_key] = toJson(materials);
+      Export({scratch / "out", "--format", "tiff"}).sink().plan(job.schema);
+    };
+  };
+  EXPECT_NO_THROW(planning(255)());
+  EXPECT_THAT(planning(256), ThrowsMessage<UsageError>(
+                                 HasSubstr("tiff has room for 255 materials, and there are 256")));
+}
+
 TEST(SliceExport, NamesOfFilesMayBeAsLongAsTheFileSystemAllows) {
   const test::ScratchFolder scratch;
   const std::string prefix(246, 'p');

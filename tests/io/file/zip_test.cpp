@@ -1,5 +1,6 @@
 #include "io/file/zip.h"
 
+#include <algorithm>
 #include <fstream>
 #include <string>
 
@@ -146,6 +147,35 @@ TEST(Zip, RefusesVeryManyMembersWhateverTheArchiveStates) {
   writer.finish();
   EXPECT_THAT([&] { ZipReader(scratch / "a.zip"); },
               ThrowsMessage<DataError>(HasSubstr("its member '262144' is one too many; pack")));
+}
+
+/// An archive whose directory states that its only member is deflated and has these sizes.
+std::filesystem::path archiveStating(const test::ScratchFolder& scratch, std::uint32_t packed,
+                                     std::uint32_t inflated) {
+  Bytes bytes = test::fileBytes(archiveOf(scratch, {"one"}));
+  const Bytes signature{'P', 'K', 1, 2};
+  const auto entry = std::search(bytes.begin(), bytes.end(), signature.begin(), signature.end());
+  EXPECT_NE(entry, bytes.end());
+  const auto state = [&](std::ptrdiff_t at, int size, std::uint32_t value) {
+    for (int i = 0; i < size; ++i) *(entry + at + i) = static_cast<std::uint8_t>(value >> 8 * i);
+  };
+  constexpr std::uint32_t deflated = 8;
+  state(10, 2, deflated);
+  state(20, 4, packed);
+  state(24, 4, inflated);
+  writeFile(scratch / "a.zip", bytes, "a.zip");
+  return scratch / "a.zip";
+}
+
+TEST(Zip, LargeMembersInflateByTwoHundredAtMost) {
+  const test::ScratchFolder scratch;
+  const auto refused =
+      ThrowsMessage<DataError>(HasSubstr(": its member 'one' inflates more than 200 to 1; pack"));
+  const std::uint32_t packed = 100000;
+  EXPECT_NO_THROW(ZipReader(archiveStating(scratch, packed, 200 * packed)));
+  EXPECT_THAT([&] { ZipReader(archiveStating(scratch, packed, 200 * packed + 200)); }, refused);
+  EXPECT_NO_THROW(ZipReader(archiveStating(scratch, 1, 16 << 20)));
+  EXPECT_THAT([&] { ZipReader(archiveStating(scratch, 1, (16 << 20) + 1)); }, refused);
 }
 
 TEST(Zip, ReadsAnArchiveInMemory) {

@@ -196,10 +196,40 @@ TEST(PngSpans, PixelSizeIsDotsPerMetre) {
 }
 
 TEST(PngSpans, BlankImageCostsTwoBitsPer258BytesAndAFewPerRow) {
-  const SpanImage image = spanImage(2857, 1416, [](int, int) { return 0U; });
+  const SpanImage image = spanImage(2857, 1416, [](int, int) { return 1U; });
   const double bytes = 1416.0 * 2857 * 4;
-  EXPECT_LT(static_cast<double>(encodePng(image, {PngPixels::rgba8, colours, 0, 0}).size()),
-            bytes / 258 / 4 + 1416 * 3 + 200);
+  const PngFormat format{PngPixels::rgba8, colours, 0, 0};
+  EXPECT_LT(static_cast<double>(encodePng(image, format).size()), bytes / 258 / 4 + 1416 * 3 + 200);
+  expectDecodes(image, format);
+}
+
+/// An image of one span a row.
+SpanImage plain(std::uint32_t width, std::uint32_t height, std::uint32_t value) {
+  SpanImage image{width, height, {0}, {}};
+  for (std::uint32_t y = 0; y < height; ++y) {
+    image.spans.push_back({width, value});
+    image.row_begin.push_back(image.spans.size());
+  }
+  return image;
+}
+
+/// Sums over a run exceed 32 bits here, and its length the modulus of Adler-32; zlib, in libpng and
+/// spng, refuses a wrong sum.
+TEST(PngSpans, RunsLongerThanTheModulusOfAdler32Decode) {
+  expectDecodes(plain(70000, 2, rgba(250, 251, 252, 253)), {});
+  expectDecodes(plain(300000, 1, rgba(255, 255, 255, 255)), {});
+  expectDecodes(plain(300000, 1, 255), {PngPixels::grey8, {}, 0, 0});
+  expectDecodes(plain(600000, 2, 1), {PngPixels::grey1, {}, 0, 0});
+}
+
+TEST(PngSpans, AnImageThatIsTooWideIsRefused) {
+  EXPECT_NO_THROW(encodePng(plain(1 << 24, 1, 0), {PngPixels::grey1, {}, 0, 0}));
+  EXPECT_THAT(
+      [] {
+        encodePng(plain((1 << 24) + 1, 1, 0), {PngPixels::grey1, {}, 0, 0});
+      },
+      testing::ThrowsMessage<DataError>(
+          "an image of 16777217 x 1 pixels cannot be a PNG; each side must have 1 to 16777216"));
 }
 
 TEST(PngSpans, AnImageWithoutPixelsIsRefused) {

@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "io/file/staged_output.h"
+#include "io/image/colour_image.h"
 #include "io/image/png_spans.h"
+#include "io/image/tiff_memory.h"
 #include "tests/support/scratch_folder.h"
 #include "tests/support/span_images.h"
 #include "vdbdither/model/errors.h"
@@ -52,6 +54,60 @@ TEST(Tiff, BitsComeBack) {
   }
 }
 
+/// A TIFF of one row of grey.
+std::vector<std::uint8_t> greyTiff(std::uint32_t width, std::uint16_t bits, std::uint16_t meaning,
+                                   std::vector<std::uint8_t> row) {
+  TiffMemory memory;
+  {
+    const TiffHandle tiff = openTiff(memory, "wl");
+    TIFFSetField(tiff.get(), TIFFTAG_IMAGEWIDTH, width);
+    TIFFSetField(tiff.get(), TIFFTAG_IMAGELENGTH, 1);
+    TIFFSetField(tiff.get(), TIFFTAG_BITSPERSAMPLE, bits);
+    TIFFSetField(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, 1);
+    TIFFSetField(tiff.get(), TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+    TIFFSetField(tiff.get(), TIFFTAG_PHOTOMETRIC, meaning);
+    EXPECT_EQ(TIFFWriteScanline(tiff.get(), row.data(), 0), 1);
+  }
+  return memory.written;
+}
+
+const SizeCheck any_size = [](std::uint32_t, std::uint32_t) {};
+
+std::vector<std::uint32_t> valuesOf(const SpanImage& image) {
+  std::vector<std::uint32_t> values;
+  for (const Span& span : image.spans) values.resize(span.end, span.value);
+  return values;
+}
+
+TEST(Tiff, OfBitsWhoseZeroIsWhiteIsInverted) {
+  using testing::ElementsAre;
+  const std::vector<std::uint8_t> row{0b10110000};
+  const auto black_is_zero = greyTiff(4, 1, PHOTOMETRIC_MINISBLACK, row);
+  const auto white_is_zero = greyTiff(4, 1, PHOTOMETRIC_MINISWHITE, row);
+  EXPECT_THAT(valuesOf(decodeTiff(black_is_zero)), ElementsAre(1, 0, 1, 1));
+  EXPECT_THAT(valuesOf(decodeTiff(white_is_zero)), ElementsAre(0, 1, 0, 0));
+  const std::uint32_t white = rgba(255, 255, 255);
+  const std::uint32_t black = rgba(0, 0, 0);
+  EXPECT_THAT(valuesOf(decodeTiffImage(black_is_zero, any_size).pixels),
+              ElementsAre(white, black, white, white));
+  EXPECT_THAT(valuesOf(decodeTiffImage(white_is_zero, any_size).pixels),
+              ElementsAre(black, white, black, black));
+}
+
+TEST(Tiff, OfGreyWhoseZeroIsWhiteIsInvertedAsAColour) {
+  using testing::ElementsAre;
+  const auto colours = [](std::uint16_t bits, std::uint16_t meaning,
+                          const std::vector<std::uint8_t>& row) {
+    return valuesOf(decodeTiffImage(greyTiff(2, bits, meaning, row), any_size).pixels);
+  };
+  const std::uint32_t dark = rgba(1, 1, 1);
+  const std::uint32_t light = rgba(254, 254, 254);
+  EXPECT_THAT(colours(8, PHOTOMETRIC_MINISBLACK, {1, 254}), ElementsAre(dark, light));
+  EXPECT_THAT(colours(8, PHOTOMETRIC_MINISWHITE, {1, 254}), ElementsAre(light, dark));
+  EXPECT_THAT(colours(16, PHOTOMETRIC_MINISBLACK, {0, 1, 0, 254}), ElementsAre(dark, light));
+  EXPECT_THAT(colours(16, PHOTOMETRIC_MINISWHITE, {0, 1, 0, 254}), ElementsAre(light, dark));
+}
+
 TEST(Tiff, RefusesWhatItCannotReadOrWrite) {
   auto bytes = encodeTiff(test::spanImage(37, 70, stripes), {palette, 1, 1});
   const std::vector<std::uint8_t> text = {'n', 'o', 'n', 'e'};
@@ -67,6 +123,8 @@ TEST(Tiff, RefusesWhatItCannotReadOrWrite) {
         encodeTiff(SpanImage{}, {palette, 1, 1});
       },
       ThrowsMessage<DataError>("an image without pixels is no TIFF"));
+  EXPECT_NO_THROW(
+      encodeTiff(test::spanImage(2, 2, stripes), {std::vector<std::uint32_t>(256), 1, 1}));
   const std::vector<std::uint32_t> many(257);
   EXPECT_THAT(
       [&] {

@@ -365,6 +365,32 @@ TEST(Manifest, RefusesWhatDoesNotFitTogether) {
   }
 }
 
+TEST(Manifest, OfSlicesThatAreTooWideTooHighOrTooManyIsRefused) {
+  constexpr int widest = 1 << 24;
+  for (int axis = 0; axis < 3; ++axis) {
+    Manifest large = example();
+    const auto withVoxels = [&](int count) {
+      large.layout.box.max()[axis] = large.layout.box.min()[axis] + count - 1;
+      if (axis == 2) large.lattice.box = large.layout.box;
+      return textOf(large);
+    };
+    const int padding = axis < 2 ? large.layout.padding : 0;
+    EXPECT_EQ(refusal(withVoxels(widest - 2 * padding)), "") << axis;
+    EXPECT_THAT(refusal(withVoxels(widest - 2 * padding + 1)),
+                HasSubstr("box, padding and layers do not fit together"))
+        << axis;
+  }
+}
+
+TEST(Manifest, RefusesASizeThatDoesNotFollowFromBoxAndPadding) {
+  const auto refused = HasSubstr("'size' must be the width and height that follow from");
+  for (const char* size : {"  5,\n  4,\n", "  6,\n  3,\n"})
+    EXPECT_THAT(refusal(replaced(example_text, "  6,\n  4,\n", size), EditedStack::taken), refused);
+  EXPECT_THAT(
+      refusal(replaced(example_text, "\"padding\": 1", "\"padding\": 0"), EditedStack::taken),
+      refused);
+}
+
 TEST(Manifest, RefusesOtherFiles) {
   for (const char* text : {"", "{}", "[1]", "no JSON"}) {
     EXPECT_THAT([&] { readBack(text); },

@@ -114,6 +114,7 @@ TEST(SliceFrame, RefusesWhatThereIsNoRoomFor) {
           "mesh2sdf --rotate, or make it smaller with --fit"));
   EXPECT_THAT([&] { planned(part, {.padding = 1}, "sl1", display()); },
               ThrowsMessage<UsageError>(HasSubstr("or give --tray none")));
+  EXPECT_NO_THROW(planned(CoordBBox(Coord(0, 0, 0), Coord((1 << 24) - 1, 9, 9)), {}, "png", {}));
   EXPECT_THAT([&] { planned(CoordBBox(Coord(0, 0, 0), Coord(1 << 24, 9, 9)), {}, "png", {}); },
               ThrowsMessage<UsageError>("slices would be more than 16777216 voxels wide"));
 }

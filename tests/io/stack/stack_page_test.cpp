@@ -405,6 +405,7 @@ TEST_F(StackPages, RefuseStacksOfAnotherPitchAndTooManyMaterials) {
               StackPage({0, 1}, {"a", manifest(1, 256)});
             }),
             "a page has room for 255 materials, and there are 256");
+  EXPECT_EQ(refusalOf([&] { StackPage({0, 1}, {"a", manifest(1, 255)}); }), "");
 }
 
 TEST_F(StackPages, RefuseNamesThatAreNoPages) {

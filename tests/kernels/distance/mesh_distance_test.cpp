@@ -182,6 +182,26 @@ TEST(MeshFeatures, FacesAnswerForWhatHardlyBends) {
   EXPECT_LT(count[MeshFeatures::Kind::edge], mesh.triangles.size() / 2);
 }
 
+/// A roof of 0.3 mm whose ridge points up and runs along y, with slopes of `degrees`.
+Mesh roof(double degrees) {
+  const double rise_mm = 0.12 * std::tan(degrees * std::numbers::pi / 180);
+  Mesh mesh;
+  for (const double y : {-0.15, 0.15})
+    for (const Vec3d& corner : {Vec3d(-0.12, y, 0), Vec3d(0.12, y, 0), Vec3d(0, y, rise_mm)})
+      mesh.vertices.push_back(corner);
+  mesh.triangles = {{0, 1, 2}, {3, 5, 4}, {1, 4, 5}, {1, 5, 2},
+                    {0, 2, 5}, {0, 5, 3}, {0, 3, 4}, {0, 4, 1}};
+  return mesh;
+}
+
+TEST_P(OnEveryLattice, DistanceToABluntRidgeTowardsAnAxisIsExact) {
+  for (const double degrees : {20, 38}) {
+    for (const Vec3d& turn : {Vec3d(0, 0, 0), Vec3d(180, 0, 0), Vec3d(0, 90, 0), Vec3d(0, -90, 0),
+                              Vec3d(90, 0, 90), Vec3d(-90, 0, 90)})
+      expectExactOn(transformed(roof(degrees), turn, {0.01, 0.02, 0.005}));
+  }
+}
+
 TEST_P(OnEveryLattice, DistanceToAThinPlateIsExact) {
   expectExactOn(transformed(boxMesh({-0.7, -0.6, 0}, {0.7, 0.6, 0.004}), {3, 5, 0}, {0, 0, 0}));
 }
@@ -365,6 +385,49 @@ TEST(MeshDistance, TheDefaultBandHoldsWhatDitheringReads) {
         transformed(boxMesh({-0.4, -0.3, -0.2}, {0.4, 0.3, 0.2}), {2, 31, 12}, {0.1, 0.2, 0.3}),
         pitch);
     expectBandForDithering(torusMesh({0, 0, 0.4}, 0.4, 0.2, 18), pitch);
+  }
+}
+
+/// Checks by brute force that the default band reaches as far as `Band` says, whatever the sign.
+void expectDefaultBandReaches(const Mesh& mesh, const Vec3d& pitch_mm) {
+  const Lattice lattice = latticeAround(mesh, pitch_mm, {0, 0, 0}, 5);
+  const DistanceGrids band = MeshDistance(mesh, lattice, Band{}).run(lattice.layers());
+  int reached = 0;
+  int wrong = 0;
+  for (auto it = lattice.box.begin(); it && wrong < 5; ++it) {
+    const Vec3d p = lattice.position(*it);
+    const Nearest nearest = bruteForce(mesh, p);
+    if (nearest.distance < 1e-6) continue;
+    const Vec3d n = (p - nearest.point) / nearest.distance;
+    double reach_mm = diameterAlong(n, pitch_mm);
+    for (int axis = 0; axis < 3; ++axis)
+      reach_mm = std::max(reach_mm, std::abs(n[axis]) * pitch_mm[axis]);
+    if (nearest.distance > reach_mm - 1e-6) continue;
+    ++reached;
+    if (!band.surface->tree().isValueOn(*it))
+      ++wrong, ADD_FAILURE() << *it << " at " << nearest.distance << " is inactive";
+  }
+  EXPECT_GT(reached, 100);
+}
+
+TEST(MeshDistance, TheDefaultBandHoldsWhatDitheringReadsOfCoarseSpheres) {
+  for (const Vec3d& pitch : {mimaki, cube}) {
+    for (const int rings : {2, 3, 4})
+      expectBandForDithering(sphereMesh({0.1, 0.2, 0.3}, 0.45, rings), pitch);
+  }
+}
+
+TEST(MeshDistance, TheDefaultBandReachesAsFarOnCoarseAndOpenMeshes) {
+  for (const Vec3d& pitch : {mimaki, cube}) {
+    for (const int rings : {2, 3, 4})
+      expectDefaultBandReaches(sphereMesh({0.1, 0.2, 0.3}, 0.3, rings), pitch);
+    Mesh open = boxMesh({-0.21, -0.22, -0.2}, {0.23, 0.2, 0.21});
+    open.triangles.resize(7);
+    expectDefaultBandReaches(open, pitch);
+    Mesh sheet;
+    sheet.vertices = {{-0.31, -0.2, 0.011}, {0.3, -0.22, 0.011}, {0.1, 0.3, 0.011}};
+    sheet.triangles = {{0, 1, 2}};
+    expectDefaultBandReaches(sheet, pitch);
   }
 }
 

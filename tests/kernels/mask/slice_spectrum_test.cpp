@@ -91,6 +91,71 @@ TEST(SliceSpectra, ProjectionCountsAFrequencyAtItsDistanceFromTheNormal) {
   EXPECT_EQ(bandOf({4, 0, 10}), 0);
 }
 
+/// The band that holds the power of one frequency of a tile of 20 voxels along each axis.
+int bandOfWave(const Coord& cycles, const Vec3d& pitch_mm, const Vec3d& normal, SliceModel model) {
+  PowerSpectrum wave{{20, 20, 20}, std::vector<float>(8000, 0.0F)};
+  const auto at = [](const Coord& c) {
+    const auto wrapped = [](int n) { return static_cast<std::size_t>((n + 20) % 20); };
+    return wrapped(c.x()) + 20 * (wrapped(c.y()) + 20 * wrapped(c.z()));
+  };
+  wave.power[at(cycles)] = wave.power[at(Coord(0) - cycles)] = 1;
+  const SliceSpectra::Facet facet = SliceSpectra({&wave, 1}, pitch_mm, model).facet(normal);
+  for (int band = 0; band < band_count; ++band)
+    if (facet.power[0][band] > 0) return band;
+  return band_count;
+}
+
+/// The band of a frequency in cycles / mm, where the coarsest pitch is 0.08 mm.
+int bandAt(double frequency) {
+  const double band = frequency * 2 * 0.08 * band_count;
+  EXPECT_GT(std::abs(band - std::round(band)), 1e-3) << "between two bands";
+  return std::min(static_cast<int>(band), band_count);
+}
+
+TEST(SliceSpectra, ProjectionMeasuresEveryAxisInMillimetres) {
+  const Vec3d pitch_mm(0.05, 0.08, 0.03);
+  for (int axis = 0; axis < 3; ++axis) {
+    Coord cycles(0);
+    cycles[axis] = 3;
+    Vec3d normal(0.0);
+    normal[(axis + 1) % 3] = 1;
+    EXPECT_EQ(bandOfWave(cycles, pitch_mm, normal, SliceModel::projection),
+              bandAt(0.15 / pitch_mm[axis]))
+        << axis;
+  }
+}
+
+TEST(SliceSpectra, VoxelPlaneMeasuresBothItsAxesOnTheTiltedFacet) {
+  const Vec3d pitch_mm(0.05, 0.08, 0.03);
+  for (int w = 0; w < 3; ++w) {
+    const int u = (w + 1) % 3;
+    const int v = (w + 2) % 3;
+    for (const auto& [s, t] : {std::pair(0.0, 0.0), {0.9, 0.0}, {0.0, 0.9}, {0.7, -0.6}}) {
+      // Steps of one column along u and v on the facet.
+      Vec3d along_u(0.0);
+      Vec3d along_v(0.0);
+      along_u[u] = pitch_mm[u];
+      along_u[w] = s * pitch_mm[w];
+      along_v[v] = pitch_mm[v];
+      along_v[w] = t * pitch_mm[w];
+      const Vec3d normal = along_u.cross(along_v);
+      for (const auto& [cycles_u, cycles_v] : {std::pair(2, 0), {0, 2}, {2, -1}}) {
+        Coord cycles(0);
+        cycles[u] = cycles_u;
+        cycles[v] = cycles_v;
+        // The vector of the facet by which a step along u turns the wave by cycles_u / 20, and one
+        // along v by cycles_v / 20.
+        const Vec3d frequency =
+            (cycles_u * along_v.cross(normal) + cycles_v * normal.cross(along_u)) /
+            (20 * normal.lengthSqr());
+        EXPECT_EQ(bandOfWave(cycles, pitch_mm, normal, SliceModel::voxel_plane),
+                  bandAt(frequency.length()))
+            << w << ": " << s << " " << t << ", " << cycles;
+      }
+    }
+  }
+}
+
 /// The power of the voxels (x, y, round(s·x + c)) of a tile over a window that both repeat in, in
 /// the mean over c.
 Bands sampledVoxelPlane(const std::vector<float>& values, int edge, int window) {
