@@ -1,5 +1,6 @@
 #include "io/stack/manifest.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <set>
@@ -88,6 +89,10 @@ class ManifestParser {
       if (!repeated.found.empty())
         refuse("it has the key '" + printable(shortened(repeated.found, 60)) + "' twice");
       json_ = ordered_json::parse(bytes.begin(), bytes.end());
+      // To the parser a zero byte is the end of the text, whatever follows it.
+      const auto zero = std::find(bytes.begin(), bytes.end(), 0);
+      if (zero != bytes.end())
+        refuse("it is not JSON from byte " + std::to_string(zero - bytes.begin() + 1) + " on");
     } catch (const ordered_json::parse_error& error) {
       refuse("it is not JSON from byte " + std::to_string(error.byte) + " on");
     } catch (const ordered_json::exception&) {

@@ -373,6 +373,7 @@ TEST(Manifest, RefusesOtherFiles) {
   EXPECT_EQ(refusal("{\"a\": nothing}"),
             "manifest.json' is not a manifest of slice-export: it is not JSON from byte 8 on; make "
             "the stack again with slice-export");
+  EXPECT_THAT(refusal(std::string("{}\n\0]", 5)), HasSubstr("it is not JSON from byte 4 on"));
 }
 
 }  // namespace
