@@ -34,8 +34,8 @@ PROFILE = {"name": "jet", "title": "Jet", "source": "By definition", "technology
 
 # What the readers of texts compare with: a fuzzer guesses no words.
 WORDS = ("name", "pitch_mm", "kubelka_munk", "yule_nielsen", "absorption", "scattering", "printer_notes", "number", "whole",
-         "refused", "<![CDATA[", "<!DOCTYPE", "xmlns:", "&#x", "$'", "mesh2sdf", "dither", "--layers", "--printer", "slice-export",
-         "material-assign", "!", "\\x", "0.1mm,0.2mm,0.3mm")
+         "refused", "<![CDATA[", "<!DOCTYPE", "xmlns:", "&#x", "$'", "--flag", "--whole", "--number=", "--length", "--lengths",
+         "--triple", "--coord", "--text", "white", "!", "\\x", "0.1mm,0.2mm,0.3mm")
 STACK_WORDS = ("\n@@ ", "@@ manifest.json", "sha256", "slices", "layout", "lattice", "materials", "format", "padding", "flip_x",
                "NumberOfSlices", "StartIndex", "VoxelCount", "imagesheet", "transform", "config.ini", "displayWidth")
 
@@ -142,7 +142,8 @@ class Fuzzers(ProgramTest):
         materials = [{"index": 1, "name": "white", "rgba": [1, 2, 3, 4]}]
         texts = {"profile": "p" + json.dumps(PROFILE, indent=1), "materials": "m" + json.dumps(materials),
                  "values": "k# one\nnumber = 0.5\n[two]\nwhole = 12\n", "xml": "x" + MODEL,
-                 "chain": "cmesh2sdf part.stl --pitch 0.1mm,0.2mm,0.3mm ! dither --mask 'a b' | material-assign --material $'w\\x41'"}
+                 "chain": "cwhite part.stl --flag --whole 3 --number=0.5 ! white=1,2,3 'a b' --lengths 0.1mm,0.2mm,300um | grey=#102030 "
+                          "a --text $'w\\x41' --coord 1,2,3 --triple 1"}
         for name, text in texts.items():
             (self.seeds / name).write_text(text)
         self.fuzz("text_fuzz", WORDS)

@@ -43,12 +43,10 @@ Unpacked unpackedByZlib(std::span<const std::uint8_t> stream, std::size_t most) 
 /// Requires that the reader of plain PNG and libpng agree. The latter reads what has a chunk that
 /// the former does not know.
 void compareReaders(std::span<const std::uint8_t> png) {
-  const auto plain = decodedOrRefused([&](const SizeCheck& check) {
-    return decodePlainPng(mendedPng(png), check);
-  });
-  const auto other = decodedOrRefused([&](const SizeCheck& check) {
-    return decodePngImage(mendedPng(png, true), check);
-  });
+  const auto plain = decodedOrRefused(
+      [&](const SizeCheck& check) { return decodePlainPng(mendedPng(png), check); });
+  const auto other = decodedOrRefused(
+      [&](const SizeCheck& check) { return decodePngImage(mendedPng(png, true), check); });
   if (other) requireSound(other->pixels);
   if (!plain || !*plain) return;
   requireSound((*plain)->pixels);
@@ -88,8 +86,8 @@ void comparePacked(std::span<const std::uint8_t> unit) {
   std::vector<std::uint8_t> data{0x78, 0x9c};
   data.insert(data.end(), stream.begin(), stream.end());
   if (expected.read > 0) data.resize(2 + expected.read);
-  putBigEndian(data, static_cast<std::uint32_t>(
-                         adler32_z(1, expected.bytes.data(), expected.bytes.size())));
+  putBigEndian(
+      data, static_cast<std::uint32_t>(adler32_z(1, expected.bytes.data(), expected.bytes.size())));
   putChunk(png, "IDAT", data);
   putChunk(png, "IEND", {});
   compareReaders(png);

@@ -24,8 +24,8 @@ inline void putChunk(std::vector<std::uint8_t>& bytes, std::string_view name,
   const std::size_t begin = bytes.size();
   bytes.insert(bytes.end(), name.begin(), name.end());
   bytes.insert(bytes.end(), data.begin(), data.end());
-  putBigEndian(bytes, static_cast<std::uint32_t>(
-                          crc32_z(0, bytes.data() + begin, bytes.size() - begin)));
+  putBigEndian(bytes,
+               static_cast<std::uint32_t>(crc32_z(0, bytes.data() + begin, bytes.size() - begin)));
 }
 
 /// Returns the bytes of a PNG with the right checksum behind each chunk, and those of anything else

@@ -17,8 +17,7 @@ class ScratchFile {
   explicit ScratchFile(std::span<const std::uint8_t> bytes = {})
       : descriptor_(memfd_create("fuzz", MFD_CLOEXEC)) {
     require(descriptor_ >= 0);
-    require(::write(descriptor_, bytes.data(), bytes.size()) ==
-            static_cast<ssize_t>(bytes.size()));
+    require(::write(descriptor_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()));
   }
   ScratchFile(const ScratchFile&) = delete;
   ScratchFile& operator=(const ScratchFile&) = delete;

@@ -1,7 +1,7 @@
-// Feeds the readers of stacks and containers of slices, and `verify`, with archives that a fuzzer
-// thinks of: they return sound layers or refuse. A unit is a zip archive, or the text of its
-// members, which needs no checksums: each behind a line of `@@ ` and its name. Checksums of PNG are
-// mended.
+// Feeds the readers and the checks of stacks and containers of slices with archives that a fuzzer
+// thinks of: they return sound layers, or refuse, or tell what is wrong. A unit is a zip archive,
+// or the text of its members, which needs no checksums: each behind a line of `@@ ` and its name.
+// Checksums of PNG are mended.
 
 #include <algorithm>
 #include <cstddef>
@@ -10,16 +10,15 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "io/file/zip.h"
+#include "io/stack/checked_stack.h"
+#include "io/stack/container.h"
 #include "io/stack/image_stack.h"
 #include "io/stack/stack_reader.h"
 #include "tests/fuzz/png_parts.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/sound_slice.h"
-#include "vdbdither/engine/options.h"
-#include "vdbdither/engine/registry.h"
 
 namespace vdbdither {
 
@@ -73,17 +72,32 @@ void readImages(const std::filesystem::path& path) {
   }
 }
 
+/// Reads all layers as `verify` does: faults are found, not refused.
+void checkStack(const CheckedStack& stack, Findings& findings) {
+  const Manifest& manifest = stack.manifest();
+  StackTotals totals;
+  for (int z = manifest.layers.begin; z < manifest.layers.end; ++z) {
+    CheckedLayer layer = stack.layer(z);
+    if (layer.image) {
+      requireSound(*layer.image);
+      require(layer.image->width == manifest.layout.width() &&
+              layer.image->height == manifest.layout.height());
+    }
+    totals.add(layer, stack.shown(z), findings);
+  }
+  stack.finish(totals, findings);
+  checkPrinter(stack, totals, printerOf(manifest), findings);
+}
+
 void verifyStack(const std::filesystem::path& path, bool is_foreign) {
-  const auto tool = findTool("verify")->make();
-  Options options;
-  tool->declare(options);
-  std::vector<std::string> words{path.string(), "--json"};
-  if (is_foreign) words.insert(words.end(), {"--pitch", "0.1mm,0.1mm,0.1mm"});
-  options.parse(words);
+  Findings findings;
   try {
-    tool->run();
+    const auto stack =
+        is_foreign ? openImages(path, {}, findings) : openDescribedStack(path, findings);
+    checkStack(*stack, findings);
   } catch (const DataError&) {
   }
+  for (const Finding& finding : findings.kept()) require(isOneLine(textOf(finding)));
 }
 
 void readArchive(std::span<const std::uint8_t> bytes) {

@@ -1,6 +1,7 @@
 // Feeds the readers of texts with whatever a fuzzer can think of: they return what they write again
 // alike, or refuse. The first letter of a unit chooses the reader.
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -20,6 +21,7 @@
 #include "tests/fuzz/require.h"
 #include "vdbdither/engine/chain.h"
 #include "vdbdither/engine/json_text.h"
+#include "vdbdither/engine/options.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/printable.h"
 
@@ -83,11 +85,57 @@ void readXml(std::span<const std::uint8_t> bytes) {
   require(elements.open() == 0);
 }
 
+/// One option of each kind.
+struct Sample {
+  bool flag = false;
+  int whole = 0;
+  double number = 0, length_mm = 0;
+  openvdb::Vec3d triple{0.0}, lengths_mm{1.0};
+  openvdb::Coord coord{0, 0, 0};
+  std::string file;
+  std::vector<std::string> texts;
+
+  void declare(Options& options) {
+    options.positional("in", file, "A file");
+    options.flag("flag", flag, "A flag");
+    options.integer("whole", whole, {-5, 4096}, "A whole number");
+    options.number("number", number, {-1, 1}, "A number");
+    options.length("length", length_mm, {0, 100}, "A length");
+    options.triple("triple", triple, "X,Y,Z", {0, 1}, "Three numbers");
+    options.triple("coord", coord, "X,Y,Z", {0, 9}, "Three whole numbers");
+    options.lengths("lengths", lengths_mm, "DX,DY,DZ", {1e-3, 10}, "Three lengths");
+    options.texts("text", texts, "TEXT", "Texts");
+  }
+
+  [[nodiscard]] bool isWithinRange() const {
+    bool is_within =
+        whole >= -5 && whole <= 4096 && std::abs(number) <= 1 && length_mm >= 0 && length_mm <= 100;
+    for (int axis = 0; axis < 3; ++axis) {
+      is_within = is_within && triple[axis] >= 0 && triple[axis] <= 1 && coord[axis] >= 0 &&
+                  coord[axis] <= 9 && lengths_mm[axis] >= 1e-3 && lengths_mm[axis] <= 10;
+    }
+    return is_within;
+  }
+};
+
 void readChain(const std::string& line) {
-  const Chain chain(parseChain(splitWords(line)));
-  if (chain.helpWanted()) return;
-  require(chain.stages().size() >= 2);
-  require(chain.stages().front()->source() && chain.stages().back()->sink());
+  for (const Step& step : parseChain(splitWords(line))) {
+    require(!step.verb.empty());
+    Sample sample;
+    Options options;
+    sample.declare(options);
+    options.parse(step.arguments);
+    require(sample.isWithinRange());
+    // The history of a grid holds this line.
+    const std::string canonical = options.canonical();
+    Sample again;
+    Options options_again;
+    again.declare(options_again);
+    options_again.parse(splitWords(canonical));
+    require(options_again.canonical() == canonical);
+    for (const std::string& argument : step.arguments) materialEntries(argument);
+    parseMaterial(step.verb, {});
+  }
 }
 
 void readText(std::span<const std::uint8_t> unit) {
