@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <set>
 #include <span>
 #include <string>
@@ -272,6 +273,12 @@ Manifest manifestOf(const ManifestParser& parser) {
     manifest.slices.push_back({parser.integer(entry, "layer", -farthest, farthest),
                                parser.file(entry), parser.text(entry, "sha256"),
                                entry.contains("material") ? parser.text(entry, "material") : ""});
+  }
+  // What checks a stack looks at every layer, and tells of those that are missing.
+  constexpr std::int64_t most_unnamed = 1 << 16;
+  if (manifest.layers.size() > most_unnamed + static_cast<std::int64_t>(manifest.slices.size())) {
+    parser.refuse("it has " + std::to_string(manifest.layers.size()) + " layers and names " +
+                  std::to_string(manifest.slices.size()) + " slices");
   }
   return manifest;
 }

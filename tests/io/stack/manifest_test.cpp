@@ -365,6 +365,16 @@ TEST(Manifest, RefusesWhatDoesNotFitTogether) {
   }
 }
 
+// A check of a stack looks at every layer.
+TEST(Manifest, RefusesManyMoreLayersThanItNames) {
+  nlohmann::json json = nlohmann::json::parse(example_text);
+  json["size"][2] = 65546;
+  json["box"]["max"][2] = 1 << 20;
+  const std::size_t slices = json["slices"].size();
+  EXPECT_THAT(refusal(json.dump(), EditedStack::taken),
+              HasSubstr("it has 65546 layers and names " + std::to_string(slices) + " slices"));
+}
+
 TEST(Manifest, RefusesOtherFiles) {
   for (const char* text : {"", "{}", "[1]", "no JSON"}) {
     EXPECT_THAT([&] { readBack(text); },
