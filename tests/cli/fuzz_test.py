@@ -129,7 +129,7 @@ class Fuzzers(ProgramTest):
                 # Pictures are not read, only looked for.
                 text += f"\n@@ {member}\n".encode() + (content if len(content) < 2000 or ".png" not in member else b"")
             (self.seeds / name).write_bytes(text)
-        self.fuzz("stack_fuzz", STACK_WORDS, ["-close_fd_mask=1"])
+        self.fuzz("stack_fuzz", STACK_WORDS, ["-close_fd_mask=1", "-max_len=12288"])
 
     @staticmethod
     def members(path):
