@@ -11,6 +11,7 @@
 #include <ImfOutputFile.h>
 #include <ImfTiledOutputFile.h>
 
+#include "io/image/exr_header.h"
 #include "io/image/exr_source.h"
 #include "vdbdither/model/errors.h"
 
@@ -138,14 +139,15 @@ SpanImage decodeExr(std::span<const std::uint8_t> bytes, const std::string& chan
                     const SizeCheck& check) {
   return readingExr([&] {
     ExrSource source(bytes);
+    const Imf::Header header = readExrHeader(source);
+    const ExrSize size = exrSizeOf(header);
+    if (check) check(size.width, size.height);
+    if (!header.channels().findChannel(channel))
+      throw DataError("has no channel '" + channel + "'");
+    checkExrChunks(header, bytes.size());
     Imf::InputFile file(source, 0);
     const Imath::Box2i window = file.header().dataWindow();
-    if (check) {
-      const Imath::V2i size = window.size() + Imath::V2i(1);
-      check(static_cast<std::uint32_t>(size.x), static_cast<std::uint32_t>(size.y));
-    }
-    if (!file.header().channels().findChannel(channel))
-      throw DataError("has no channel '" + channel + "'");
+    if (window != header.dataWindow()) throw DataError("is not a readable EXR: it is damaged");
     const int width = window.max.x - window.min.x + 1;
     SpansBuilder spans(static_cast<std::uint32_t>(width));
     std::vector<float> row(static_cast<std::size_t>(width));

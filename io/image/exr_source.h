@@ -27,6 +27,7 @@ class ExrSource : public Imf::IStream {
     position_ += static_cast<std::size_t>(size);
     return position_ < bytes_.size();
   }
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }
   std::uint64_t tellg() override { return position_; }
   void seekg(std::uint64_t position) override { position_ = position; }
 

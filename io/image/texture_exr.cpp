@@ -1,8 +1,6 @@
 // OpenEXR: the OpenEXR file layout (Academy Software Foundation, version 2).
 
 #include <array>
-#include <cstdlib>
-#include <cstring>
 #include <string>
 #include <vector>
 
@@ -11,8 +9,8 @@
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfStandardAttributes.h>
-#include <ImfTileDescriptionAttribute.h>
 
+#include "io/image/exr_header.h"
 #include "io/image/exr_source.h"
 #include "io/image/texture_builder.h"
 #include "vdbdither/model/errors.h"
@@ -23,99 +21,13 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-constexpr std::size_t header_begin = 8;
-constexpr int deep_flag = 0x800;
-constexpr int multi_part_flag = 0x1000;
-
-int exrNumber(Bytes bytes, std::size_t at) {
-  if (at + 4 > bytes.size()) throw DataError("is not a readable EXR: it is cut short");
-  std::uint32_t value = 0;
-  for (std::size_t i = 0; i < 4; ++i) value |= std::uint32_t{bytes[at + i]} << 8 * i;
-  return static_cast<int>(value);
-}
-
-/// Where the text at `at` ends, behind its zero.
-std::size_t afterText(Bytes bytes, std::size_t at) {
-  while (at < bytes.size() && bytes[at] != 0) ++at;
-  return at + 1;
-}
-
-/// OpenEXR takes the memory that an attribute claims before it reads it.
-void checkExrAttributes(Bytes bytes, bool has_parts) {
-  std::size_t at = header_begin;
-  for (bool is_first = true; is_first || has_parts; is_first = false) {
-    if (at < bytes.size() && bytes[at] == 0) return;
-    while (at < bytes.size() && bytes[at] != 0) {
-      at = afterText(bytes, afterText(bytes, at));
-      const int size = exrNumber(bytes, at);
-      at += 4;
-      if (size < 0 || at > bytes.size() || static_cast<std::size_t>(size) > bytes.size() - at)
-        throw DataError("is not a readable EXR: it is cut short");
-      at += static_cast<std::size_t>(size);
-    }
-    if (at >= bytes.size()) throw DataError("is not a readable EXR: it is cut short");
-    ++at;
-  }
-}
-
-std::uint64_t rowsOfChunk(Imf::Compression compression) {
-  switch (compression) {
-    case Imf::ZIP_COMPRESSION:
-    case Imf::PXR24_COMPRESSION:
-      return 16;
-    case Imf::PIZ_COMPRESSION:
-    case Imf::B44_COMPRESSION:
-    case Imf::B44A_COMPRESSION:
-    case Imf::DWAA_COMPRESSION:
-      return 32;
-    case Imf::DWAB_COMPRESSION:
-      return 256;
-    default:
-      return 1;
-  }
-}
-
-struct ExrSize {
-  std::uint32_t width;
-  std::uint32_t height;
-};
-
-/// Checks what the header makes OpenEXR allocate.
+/// Checks the size of the picture and what it makes OpenEXR allocate.
 ExrSize checkedExrSize(const Imf::Header& header, std::size_t file_bytes) {
-  const Imath::Box2i& window = header.dataWindow();
-  const auto extent = [](int low, int high) {
-    return static_cast<std::uint64_t>(std::int64_t{high} - low + 1);
-  };
-  const std::uint64_t width = extent(window.min.x, window.max.x);
-  const std::uint64_t height = extent(window.min.y, window.max.y);
-  if (window.isEmpty()) throw DataError("has no pixels; save it again");
-  std::uint64_t pixel_bytes = 0;
-  for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel)
-    pixel_bytes += channel.channel().type == Imf::HALF ? 2 : 4;
-  checkTextureSize(width, height, pixel_bytes, file_bytes);
-
-  std::uint64_t chunk_width = width;
-  std::uint64_t chunk_height = rowsOfChunk(header.compression());
-  std::uint64_t held_rows = chunk_height;
-  if (header.hasTileDescription()) {
-    chunk_width = std::max(header.tileDescription().xSize, 1U);
-    chunk_height = std::max(header.tileDescription().ySize, 1U);
-    held_rows = std::min(chunk_height, height);
-  }
-  constexpr std::uint64_t most_held_bytes = std::uint64_t{1} << 28;
-  constexpr std::uint64_t most_tile_edge = 4096;
-  constexpr std::uint64_t read_pixel_bytes = 16;
-  if (chunk_width > std::max(width, most_tile_edge) || chunk_height > most_tile_edge ||
-      pixel_bytes > most_held_bytes / (chunk_width * chunk_height) ||
-      held_rows * width > most_held_bytes / read_pixel_bytes)
-    throw DataError(
-        "is an EXR of too many channels, or of tiles that are too large; save it again "
-        "with its colours alone");
-  // Every chunk has eight bytes in a table.
-  const std::uint64_t chunks =
-      ((width + chunk_width - 1) / chunk_width) * ((height + chunk_height - 1) / chunk_height);
-  if (chunks > file_bytes / 8) throw DataError("is not a readable EXR: it is cut short");
-  return {static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
+  const ExrSize size = exrSizeOf(header);
+  checkTextureSize(size.width, size.height, exrPixelBytes(header), file_bytes);
+  constexpr std::uint64_t most_held_pixels = 1 << 24;
+  checkExrChunks(header, file_bytes, most_held_pixels);
+  return size;
 }
 
 /// The names of the channels that are read: R, G, B or Y, and A where there is one.
@@ -150,14 +62,8 @@ ColourSpace exrColourSpace(const Imf::Header& header) {
 }
 
 Texture readExrTexture(Bytes bytes, TextureOpacity opacity) {
-  const int version = exrNumber(bytes, 4);
-  if ((version & deep_flag) != 0) throw DataError("is a deep EXR; save it flat");
-  checkExrAttributes(bytes, (version & multi_part_flag) != 0);
   ExrSource source(bytes);
-  Imf::Header header;
-  source.seekg(header_begin);
-  int read_version = version;
-  header.readFrom(source, read_version);
+  const Imf::Header header = readExrHeader(source);
   const ExrSize size = checkedExrSize(header, bytes.size());
   const std::vector<std::string> names = colourChannels(header.channels());
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "io/image/tiff_memory.h"
+#include "io/image/tiff_rows.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -77,26 +78,22 @@ SpanImage decodeTiff(std::span<const std::uint8_t> bytes, const SizeCheck& check
   const TiffHandle tiff = openTiff(memory, "r");
   const auto refuse = [&] { return DataError("is not a readable TIFF: it is damaged"); };
   if (!tiff) throw refuse();
-  std::uint32_t width = 0;
-  std::uint32_t height = 0;
-  std::uint16_t depth = 1;
-  std::uint16_t samples = 1;
-  std::uint16_t meaning = PHOTOMETRIC_MINISBLACK;
-  TIFFGetField(tiff.get(), TIFFTAG_IMAGEWIDTH, &width);
-  TIFFGetField(tiff.get(), TIFFTAG_IMAGELENGTH, &height);
-  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_BITSPERSAMPLE, &depth);
-  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, &samples);
-  TIFFGetField(tiff.get(), TIFFTAG_PHOTOMETRIC, &meaning);
+  const TiffHead head = tiffHeadOf(tiff.get());
+  const std::uint32_t width = head.width;
+  const std::uint32_t height = head.height;
   if (check) check(width, height);
-  if ((depth != 1 && depth != 8) || samples != 1 || TIFFIsTiled(tiff.get()))
+  if (width == 0 || height == 0) throw refuse();
+  if (!isPackedInAKnownWay(head))
+    throw DataError("is a TIFF packed in a way that is not read; save it with LZW or deflate");
+  if ((head.bits != 1 && head.bits != 8) || head.samples != 1 || TIFFIsTiled(tiff.get()))
     throw DataError("is a TIFF of another kind: one sample of 1 or 8 bits is wanted, in strips");
-  const std::uint32_t flip = depth == 1 && meaning == PHOTOMETRIC_MINISWHITE ? 1 : 0;
+  const std::uint32_t flip = head.bits == 1 && head.meaning == PHOTOMETRIC_MINISWHITE ? 1 : 0;
   SpansBuilder spans(width);
   std::vector<std::uint8_t> row(static_cast<std::size_t>(TIFFScanlineSize(tiff.get())));
   for (std::uint32_t y = 0; y < height; ++y) {
     if (TIFFReadScanline(tiff.get(), row.data(), y) != 1) throw refuse();
     for (std::uint32_t x = 0; x < width; ++x)
-      spans.pixel(x, depth == 8 ? row[x] : (row[x / 8] >> (7 - x % 8) & 1U) ^ flip);
+      spans.pixel(x, head.bits == 8 ? row[x] : (row[x / 8] >> (7 - x % 8) & 1U) ^ flip);
     spans.endRow();
   }
   if (!memory.error.empty()) throw refuse();

@@ -207,14 +207,17 @@ CheckedLayer DescribedLayers::layer(int z) const {
   if (format_->pixel != SlicePixel::one_material) {
     if (const Manifest::Slice* slice = find(z, "")) layer.image = read(*slice, layer);
   } else {
-    SpanImage all = blankSlice(manifest_.layout);
+    // A slice that is there confirms the size of the layout before memory is taken for it.
+    std::optional<SpanImage> all;
     bool is_whole = true;
     for (std::uint32_t i = 1; i <= kinds_.size(); ++i) {
       const Manifest::Slice* slice = find(z, kinds_[i - 1]);
       const std::optional<SpanImage> mask = slice ? read(*slice, layer) : std::nullopt;
       is_whole = is_whole && mask;
-      if (mask) overlay(all, *mask, i, input_.shown(slice->file), layer);
+      if (mask && !all) all = blankSlice(manifest_.layout);
+      if (mask) overlay(*all, *mask, i, input_.shown(slice->file), layer);
     }
+    if (kinds_.empty()) all = blankSlice(manifest_.layout);
     if (is_whole) layer.image = std::move(all);
   }
   if (!layer.image) return layer;

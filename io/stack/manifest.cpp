@@ -1,7 +1,9 @@
 #include "io/stack/manifest.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <set>
 #include <span>
 #include <string>
@@ -88,6 +90,10 @@ class ManifestParser {
       if (!repeated.found.empty())
         refuse("it has the key '" + printable(shortened(repeated.found, 60)) + "' twice");
       json_ = ordered_json::parse(bytes.begin(), bytes.end());
+      // To the parser a zero byte is the end of the text, whatever follows it.
+      const auto zero = std::find(bytes.begin(), bytes.end(), 0);
+      if (zero != bytes.end())
+        refuse("it is not JSON from byte " + std::to_string(zero - bytes.begin() + 1) + " on");
     } catch (const ordered_json::parse_error& error) {
       refuse("it is not JSON from byte " + std::to_string(error.byte) + " on");
     } catch (const ordered_json::exception&) {
@@ -267,6 +273,12 @@ Manifest manifestOf(const ManifestParser& parser) {
     manifest.slices.push_back({parser.integer(entry, "layer", -farthest, farthest),
                                parser.file(entry), parser.text(entry, "sha256"),
                                entry.contains("material") ? parser.text(entry, "material") : ""});
+  }
+  // What checks a stack looks at every layer, and tells of those that are missing.
+  constexpr std::int64_t most_unnamed = 1 << 16;
+  if (manifest.layers.size() > most_unnamed + static_cast<std::int64_t>(manifest.slices.size())) {
+    parser.refuse("it has " + std::to_string(manifest.layers.size()) + " layers and names " +
+                  std::to_string(manifest.slices.size()) + " slices");
   }
   return manifest;
 }

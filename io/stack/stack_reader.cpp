@@ -145,17 +145,20 @@ void StackReader::checkForOthers() const {
 SpanImage StackReader::layer(int z) const {
   if (!manifest_.layers.contains(z)) return blankSlice(manifest_.layout);
   if (format_->pixel != SlicePixel::one_material) return read(*find(z, ""));
-  SpanImage all = blankSlice(manifest_.layout);
+  // A slice that is there confirms the size of the layout before memory is taken for it.
+  SpanImage all;
   for (std::uint32_t i = 1; i <= manifest_.materials.size(); ++i) {
     const Manifest::Slice& slice = *find(z, manifest_.materials[i - 1].name);
-    const int row = overlay(all, read(slice), i);
+    const SpanImage mask = read(slice);
+    if (i == 1) all = blankSlice(manifest_.layout);
+    const int row = overlay(all, mask, i);
     if (row >= 0) {
       throw DataError("the slice '" + input_.shown(slice.file) + "' has voxels in row " +
                       std::to_string(row) +
                       " that another material has already; take them out of one of the two");
     }
   }
-  return all;
+  return manifest_.materials.empty() ? blankSlice(manifest_.layout) : all;
 }
 
 SpanImage StackReader::read(const Manifest::Slice& slice) const {

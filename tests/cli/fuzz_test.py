@@ -1,10 +1,12 @@
 """Short runs of the fuzzers in tests/fuzz, from small files of every format. Longer runs: docs/reliability.md."""
 
+import json
 import os
 import pathlib
 import subprocess
 import unittest
 import zipfile
+import zlib
 
 from PIL import Image
 
@@ -24,6 +26,19 @@ MODEL = """<?xml version="1.0" encoding="UTF-8"?>
 </resources><build><item objectid="2"/><item objectid="3"/></build></model>
 """
 
+PROFILE = {"name": "jet", "title": "Jet", "source": "By definition", "technology": "resin", "pitch_mm": [0.25, 0.25, 0.25],
+           "layer_mm": [0.05, 0.5], "build_mm": [5, 5, 5], "slice_px": [6, 6], "origin": "corner", "mirror_x": True,
+           "minimum_slices": 3, "maximum_colours": 2, "containers": ["gcvf"], "point_spread_mm": [0.05, 0.05, 0.05],
+           "materials": [{"name": "white", "rgba": [240, 240, 240, 255], "density_g_per_cm3": 1.2, "resin": "Vero"},
+                         {"name": "black", "rgba": [26, 26, 29, 255], "linear_rgb": [0.01, 0.01, 0.01]}]}
+
+# What the readers of texts compare with: a fuzzer guesses no words.
+WORDS = ("name", "pitch_mm", "kubelka_munk", "yule_nielsen", "absorption", "scattering", "printer_notes", "number", "whole",
+         "refused", "<![CDATA[", "<!DOCTYPE", "xmlns:", "&#x", "$'", "--flag", "--whole", "--number=", "--length", "--lengths",
+         "--triple", "--coord", "--text", "white", "!", "\\x", "0.1mm,0.2mm,0.3mm")
+STACK_WORDS = ("\n@@ ", "@@ manifest.json", "sha256", "slices", "layout", "lattice", "materials", "format", "padding", "flip_x",
+               "NumberOfSlices", "StartIndex", "VoxelCount", "imagesheet", "transform", "config.ini", "displayWidth")
+
 
 @unittest.skipUnless(FUZZERS, "the fuzzers are not built")
 class Fuzzers(ProgramTest):
@@ -32,9 +47,13 @@ class Fuzzers(ProgramTest):
         self.seeds = self.folder / "seeds"
         self.seeds.mkdir()
 
-    def fuzz(self, name):
+    def fuzz(self, name, words=(), arguments=()):
+        if words:
+            escaped = ("".join(f"\\x{byte:02x}" for byte in word.encode()) for word in words)
+            (self.folder / "words").write_text("".join(f'"{word}"\n' for word in escaped))
+            arguments = (*arguments, "-dict=words")
         done = subprocess.run([pathlib.Path(FUZZERS) / name, f"-max_total_time={SECONDS}", "-seed=1", "-timeout=10",
-                               "-rss_limit_mb=2000", "-max_len=8192", "-verbosity=0", self.seeds],
+                               "-rss_limit_mb=2000", "-max_len=8192", "-verbosity=0", *arguments, self.seeds],
                               cwd=self.folder, stdin=subprocess.DEVNULL, capture_output=True, timeout=SECONDS + 600)
         self.assertEqual(done.returncode, 0, done.stderr.decode(errors="replace")[-4000:])
 
@@ -62,6 +81,72 @@ class Fuzzers(ProgramTest):
         for ending in ("jpg", "webp", "tif"):
             image.convert("RGB").save(self.seeds / f"image.{ending}")
         self.fuzz("texture_fuzz")
+
+    def draw_images(self):
+        image = Image.linear_gradient("L").resize((8, 8))
+        for mode in ("1", "L", "LA", "RGB", "RGBA", "P"):
+            image.convert(mode).save(self.seeds / f"{mode}.png")
+        for mode, packing in (("1", "group4"), ("1", "packbits"), ("L", "tiff_lzw"), ("P", "tiff_lzw"), ("RGB", "tiff_deflate"),
+                              ("RGBA", "raw"), ("L", "jpeg")):
+            image.convert(mode).save(self.seeds / f"{mode}-{packing}.tif", compression=packing)
+        image.convert("1").save(self.seeds / "1.bmp")
+
+    def test_the_reader_of_plain_png(self):
+        self.draw_images()
+        for file in self.seeds.iterdir():
+            if file.suffix != ".png":
+                file.unlink()
+        for kind, stride in enumerate((1 + 4 * 16, 1 + 16, 1 + 2)):
+            row = bytes(i % 5 * 50 for i in range(stride - 1))
+            rows = b"".join(bytes([y % 5]) + (row if y % 3 else bytes(stride - 1)) for y in range(16))
+            for level, strategy in ((0, zlib.Z_DEFAULT_STRATEGY), (9, zlib.Z_DEFAULT_STRATEGY), (9, zlib.Z_FIXED), (9, zlib.Z_HUFFMAN_ONLY)):
+                packer = zlib.compressobj(level, zlib.DEFLATED, -15, 9, strategy)
+                (self.seeds / f"packed-{kind}-{level}-{strategy}").write_bytes(bytes([kind, 15, 15]) + packer.compress(rows) + packer.flush())
+        self.fuzz("plain_png_fuzz")
+
+    def test_the_decoders_of_slices(self):
+        self.draw_images()
+        self.make_stacks("exr")
+        (self.seeds / "slice.exr").write_bytes(next((self.folder / "exr").rglob("*.exr")).read_bytes())
+        self.fuzz("slice_image_fuzz")
+
+    def make_stacks(self, *names):
+        """Exports a box in formats, and to containers."""
+        meshes.write_stl(self.folder / "part.stl", meshes.box((1, 1, 1)))
+        (self.folder / "jet.json").write_text(json.dumps(PROFILE))
+        for name in names:
+            form = ("--3mf-level-set",) if name.endswith(".3mf") else () if "." in name else ("--format", name)
+            self.succeed("mesh2sdf", "part.stl", "--printer", "jet.json", "!", "dither", "!", "material-assign", "--material", "white",
+                         "!", "slice-export", name, *form)
+
+    def test_the_readers_of_stacks(self):
+        containers = ("out.gcvf", "out.sl1", "out.uvj", "out.3mf")
+        formats = ("png", "png1", "png8", "tiff", "tiff1", "exr", "objet")
+        self.make_stacks(*containers, *formats)
+        for name in (*containers, *formats):
+            text = b""
+            for member, content in self.members(self.folder / name):
+                # Pictures are not read, only looked for.
+                text += f"\n@@ {member}\n".encode() + (content if len(content) < 2000 or ".png" not in member else b"")
+            (self.seeds / name).write_bytes(text)
+        self.fuzz("stack_fuzz", STACK_WORDS, ["-close_fd_mask=1", "-max_len=12288"])
+
+    @staticmethod
+    def members(path):
+        if path.is_dir():
+            return [(str(file.relative_to(path)), file.read_bytes()) for file in sorted(path.rglob("*")) if file.is_file()]
+        with zipfile.ZipFile(path) as archive:
+            return [(name, archive.read(name)) for name in archive.namelist()]
+
+    def test_the_readers_of_texts(self):
+        materials = [{"index": 1, "name": "white", "rgba": [1, 2, 3, 4]}]
+        texts = {"profile": "p" + json.dumps(PROFILE, indent=1), "materials": "m" + json.dumps(materials),
+                 "values": "k# one\nnumber = 0.5\n[two]\nwhole = 12\n", "xml": "x" + MODEL,
+                 "chain": "cwhite part.stl --flag --whole 3 --number=0.5 ! white=1,2,3 'a b' --lengths 0.1mm,0.2mm,300um | grey=#102030 "
+                          "a --text $'w\\x41' --coord 1,2,3 --triple 1"}
+        for name, text in texts.items():
+            (self.seeds / name).write_text(text)
+        self.fuzz("text_fuzz", WORDS)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Tests the tool verify: each finding by a stack that has just that fault."""
 
 import json
+import os
 import shutil
 import struct
 import subprocess
@@ -174,6 +175,26 @@ class Verify(ProgramTest):
         self.assertEqual(findings[0]["text"], "the slice has 5 x 5 pixels, and the first one 12 x 8 pixels; save all slices alike")
         self.repack("out.sl1", {"slice00001.png": (self.folder / "drawn/s1.png").read_bytes(), "slice00002.png": b"x"})
         self.find({("error", "slice-size"): 1, ("error", "unreadable-slice"): 1}, "out.sl1")
+
+    def peak_mb(self, *arguments):
+        """Returns the memory that a run takes at most, and what it says."""
+        process = self.start(*arguments, stderr=subprocess.STDOUT)
+        said = process.stdout.read().decode()
+        return os.wait4(process.pid, 0)[2].ru_maxrss / 1024, said
+
+    def test_a_size_that_no_slice_has_takes_no_memory(self):
+        def heighten(manifest):
+            manifest["box"]["min"][1], manifest["box"]["max"][1] = -2**23, 2**23 - 1
+            manifest["size"][1] = 2**24
+
+        readers = (("verify", "png1-out"), ("slice-import", "png1-out", "--edited", "-o", "new.vdb"))
+        self.make("png1-out")
+        usual = [self.peak_mb(*reader)[0] for reader in readers]
+        self.edit_manifest("png1-out", heighten)
+        for reader, sound in zip(readers, usual):
+            peak, said = self.peak_mb(*reader)
+            self.assertIn("12 x 8 pixels, not 12 x 16777216", said)
+            self.assertLess(peak, sound + 128)
 
     def test_every_stray_colour_is_told_with_its_first_pixel(self):
         def spoil(content):

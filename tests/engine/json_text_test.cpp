@@ -36,6 +36,8 @@ TEST(JsonText, TextThatIsNoJsonOrNestsTooDeepIsDiscarded) {
   EXPECT_FALSE(parsedJson(std::string(100, '[') + std::string(100, ']')).is_discarded());
   EXPECT_TRUE(parsedJson(std::string(101, '[') + std::string(101, ']')).is_discarded());
   EXPECT_TRUE(parsedJson(std::string(10'000'000, '[')).is_discarded());
+  EXPECT_TRUE(parsedJson(std::string_view("1\0]", 3)).is_discarded());
+  EXPECT_TRUE(parsedJson(std::string_view("{}\0", 3)).is_discarded());
 }
 
 }  // namespace

@@ -3,22 +3,13 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <string_view>
 
 #include "io/mesh/mesh_reader.h"
+#include "tests/fuzz/require.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
-
-/// Ends the program, which a fuzzer takes for a find.
-inline void require(bool condition) {
-  if (!condition) std::abort();
-}
-
-inline bool isOneLine(std::string_view message) {
-  return message.find_first_of("\r\n") == std::string_view::npos;
-}
 
 inline void requireShares(const openvdb::Vec4f& colour) {
   for (int i = 0; i < 4; ++i) require(colour[i] >= 0 && colour[i] <= 1);

@@ -75,7 +75,9 @@ std::string jsonText(ordered_json json, int indent) {
 
 ordered_json parsedJson(std::string_view text) {
   constexpr int deepest = 100;
-  if (depthOf(text) > deepest) return ordered_json::value_t::discarded;
+  // To the parser a zero byte is the end of the text, whatever follows it.
+  if (depthOf(text) > deepest || text.find('\0') != std::string_view::npos)
+    return ordered_json::value_t::discarded;
   return ordered_json::parse(text, nullptr, false);
 }
 

@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -10,6 +12,7 @@
 #include <png.h>
 
 #include "io/image/exr.h"
+#include "io/image/png_spans.h"
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"
 
@@ -84,10 +87,35 @@ TEST_F(GreyImageFile, RefusesWhatIsNoHeightMap) {
   const std::vector<std::uint8_t> grey(4, 7);
   png(PNG_FORMAT_GRAY, 2, 2, grey.data());
   std::filesystem::resize_file(path, std::filesystem::file_size(path) - 20);
-  EXPECT_THAT(reading, ThrowsMessage<DataError>(HasSubstr("is no height map: ")));
+  EXPECT_THAT(reading, ThrowsMessage<DataError>(
+                           HasSubstr("is no height map: it is not a readable PNG: it is cut")));
   exr({{"Y", false}}, 1);
   std::filesystem::resize_file(path, std::filesystem::file_size(path) - 20);
-  EXPECT_THAT(reading, ThrowsMessage<DataError>(HasSubstr("is no height map: ")));
+  EXPECT_THAT(reading, ThrowsMessage<DataError>(HasSubstr("is no height map: it is ")));
+}
+
+TEST_F(GreyImageFile, RefusesMorePixelsThanAreRead) {
+  const auto reading = [this] { readGreyImage(path); };
+  const auto write = [this](const std::vector<std::uint8_t>& bytes) {
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+  };
+  for (const auto& [width, height] : {std::pair(65537U, 1U), std::pair(16385U, 16385U)}) {
+    SpansBuilder blank(width);
+    for (std::uint32_t y = 0; y < height; ++y) blank.endRow();
+    write(encodePng(blank.finish(), {.pixels = PngPixels::grey1, .palette = {}}));
+    EXPECT_THAT(reading, ThrowsMessage<DataError>(HasSubstr(
+                             "is no height map: it has " + std::to_string(width) + " x " +
+                             std::to_string(height) + " pixels; at most 268435456 are read")));
+  }
+  // The lower right corner of the window at 16385, 16385.
+  exr({{"Y", false}}, 1);
+  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  file.seekp(static_cast<std::streamoff>(text.find("dataWindow") + 11 + 6 + 4 + 8));
+  file.write("\x01\x40\0\0\x01\x40\0\0", 8).flush();
+  EXPECT_THAT(reading, ThrowsMessage<DataError>(HasSubstr("it has 16386 x 16386 pixels; at most")));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "io/image/tiff.h"
 
+#include <algorithm>
 #include <tiffio.h>
 
 #include <gmock/gmock.h>
@@ -106,6 +107,19 @@ TEST(Tiff, OfGreyWhoseZeroIsWhiteIsInvertedAsAColour) {
   EXPECT_THAT(colours(8, PHOTOMETRIC_MINISWHITE, {1, 254}), ElementsAre(light, dark));
   EXPECT_THAT(colours(16, PHOTOMETRIC_MINISBLACK, {0, 1, 0, 254}), ElementsAre(dark, light));
   EXPECT_THAT(colours(16, PHOTOMETRIC_MINISWHITE, {0, 1, 0, 254}), ElementsAre(light, dark));
+}
+
+// Some of the packings of libtiff do not keep within the rows that are read.
+TEST(Tiff, RefusesPackingsThatAreNotRead) {
+  auto bytes = encodeTiff(test::spanImage(37, 70, stripes), {palette, 1, 1});
+  // Tag 259, one number of 16 bits.
+  const std::vector<std::uint8_t> tag = {0x03, 0x01, 3, 0, 1, 0, 0, 0};
+  const auto packing = std::search(bytes.begin(), bytes.end(), tag.begin(), tag.end()) + 8;
+  ASSERT_EQ(*packing, COMPRESSION_LZW);
+  packing[0] = COMPRESSION_PIXARLOG & 255;
+  packing[1] = COMPRESSION_PIXARLOG >> 8;
+  EXPECT_THAT([&] { decodeTiff(bytes); },
+              ThrowsMessage<DataError>(HasSubstr("is a TIFF packed in a way that is not read")));
 }
 
 TEST(Tiff, RefusesWhatItCannotReadOrWrite) {

@@ -58,6 +58,8 @@ TEST(JsonSyntaxProblem, TellsLineAndColumn) {
   EXPECT_THAT(jsonSyntaxProblem("{\n"), StartsWith("line 2, column 1: this is not JSON: "));
   EXPECT_THAT(jsonSyntaxProblem(""), StartsWith("line 1, column 1: this is not JSON: "));
   EXPECT_THAT(jsonSyntaxProblem("// a\n{}"), StartsWith("line 1, column 1: this is not JSON: "));
+  EXPECT_EQ(jsonSyntaxProblem(std::string_view("{}\n\0]", 5)),
+            "line 2, column 1: this is not JSON: a zero byte");
   EXPECT_EQ(jsonSyntaxProblem(std::string(101, '[') + std::string(101, ']')),
             "the text nests deeper than a profile");
 }

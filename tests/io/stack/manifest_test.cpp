@@ -391,6 +391,16 @@ TEST(Manifest, RefusesASizeThatDoesNotFollowFromBoxAndPadding) {
       refused);
 }
 
+// A check of a stack looks at every layer.
+TEST(Manifest, RefusesManyMoreLayersThanItNames) {
+  nlohmann::json json = nlohmann::json::parse(example_text);
+  json["size"][2] = 65546;
+  json["box"]["max"][2] = 1 << 20;
+  const std::size_t slices = json["slices"].size();
+  EXPECT_THAT(refusal(json.dump(), EditedStack::taken),
+              HasSubstr("it has 65546 layers and names " + std::to_string(slices) + " slices"));
+}
+
 TEST(Manifest, RefusesOtherFiles) {
   for (const char* text : {"", "{}", "[1]", "no JSON"}) {
     EXPECT_THAT([&] { readBack(text); },
@@ -399,6 +409,7 @@ TEST(Manifest, RefusesOtherFiles) {
   EXPECT_EQ(refusal("{\"a\": nothing}"),
             "manifest.json' is not a manifest of slice-export: it is not JSON from byte 8 on; make "
             "the stack again with slice-export");
+  EXPECT_THAT(refusal(std::string("{}\n\0]", 5)), HasSubstr("it is not JSON from byte 4 on"));
 }
 
 }  // namespace
