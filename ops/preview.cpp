@@ -21,8 +21,9 @@ namespace {
 class Preview : public Tool {
  public:
   void declare(Options& options) override {
-    options.positional("stack", stack_,
-                       "Stack of slices: its folder, its manifest, or its zip archive");
+    options.positional(
+        "stack", stack_,
+        "Stack of slices: its folder, its manifest, its zip archive, or a container");
     options.positional("page", page_,
                        "Page to write (.html); by default it is called like the stack", false);
     options.file("against", against_, "STACK", "Another stack, whose differences the page shows");

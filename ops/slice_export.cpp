@@ -113,7 +113,7 @@ class SliceExport : public Sink {
     const double leaves = schema_.footprint.at_surface;
     if (leaves == 0) return {folder_, 0};
     const double per_leaf = format_->bytes_per_leaf * filesOfLayer();
-    const double per_slice = 500 + (folder_.ends_with(".zip") ? 0 : 2048 * filesOfLayer());
+    const double per_slice = 500 + (namesArchive(folder_) ? 0 : 2048 * filesOfLayer());
     return {folder_, leaves * per_leaf + schema_.lattice.layers().size() * per_slice};
   }
 
@@ -138,7 +138,7 @@ class SliceExport : public Sink {
     }
     inGroups(in.core, [&](ZRange layers) {
       if (frame_.crop) {
-        for (const SpanImage& slice : slices(in, layers, wholeLayout())) keep(slice, layers);
+        for (const SpanImage& slice : slices(in, layers, wholeLayout())) keep(slice);
       } else {
         add(layers, slices(in, layers, stack_.layout), in.grids);
       }
@@ -304,30 +304,21 @@ class SliceExport : public Sink {
   [[nodiscard]] SliceLayout wholeLayout() const { return {schema_.lattice.box, 0, false, false}; }
 
   /// Keeps a slice of the whole lattice, and grows the box of what is printed.
-  void keep(const SpanImage& slice, ZRange layers) {
+  void keep(const SpanImage& slice) {
+    expandByPrinted(printed_, slice, static_cast<int>(spool_->size()));
     spool_->add(slice);
-    const openvdb::CoordBBox& box = schema_.lattice.box;
-    for (std::uint32_t y = 0; y < slice.height; ++y) {
-      std::uint32_t begin = 0;
-      for (const Span& span : slice.row(y)) {
-        if (span.value != 0) {
-          const int row = box.max().y() - static_cast<int>(y);
-          printed_.expand(
-              openvdb::Coord(box.min().x() + static_cast<int>(begin), row, layers.begin));
-          printed_.expand(
-              openvdb::Coord(box.min().x() + static_cast<int>(span.end) - 1, row, layers.begin));
-        }
-        begin = span.end;
-      }
-    }
   }
 
   /// Writes the slices that were kept, in the frame of what is printed.
   void writeKept() {
     openvdb::CoordBBox part = schema_.lattice.box;
-    for (int axis = 0; axis < 2 && !printed_.empty(); ++axis) {
-      part.min()[axis] = printed_.min()[axis];
-      part.max()[axis] = printed_.max()[axis];
+    if (!printed_.empty()) {
+      // The first row of a slice is that of the maximum y.
+      const openvdb::CoordBBox whole = part;
+      part.min().x() = whole.min().x() + printed_.min().x();
+      part.max().x() = whole.min().x() + printed_.max().x();
+      part.min().y() = whole.max().y() - printed_.max().y();
+      part.max().y() = whole.max().y() - printed_.min().y();
     }
     planFrame(
         frame_, part, *format_, printer_, [this](const std::string& text) { report().warn(text); },
@@ -405,7 +396,7 @@ class SliceExport : public Sink {
   std::optional<StackWriter> writer_;
   std::optional<SpanSpool> spool_;  ///< slices whose frame is not known yet
   int first_kept_ = 0;              ///< the layer of the first of these
-  openvdb::CoordBBox printed_;
+  openvdb::CoordBBox printed_;      ///< columns, rows and numbers of the slices kept
   std::optional<StackPage> page_;
 };
 

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <string>
 
+#include "io/file/little_endian.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -20,10 +21,6 @@ constexpr std::size_t pixels_at = file_header_bytes + info_header_bytes + 8;
 constexpr double metre_mm = 1000;
 
 std::size_t rowBytes(std::uint32_t width) { return (std::size_t{width} + 31) / 32 * 4; }
-
-void put(std::vector<std::uint8_t>& bytes, std::uint64_t value, int size) {
-  for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> 8 * i));
-}
 
 std::uint32_t numberAt(std::span<const std::uint8_t> bytes, std::size_t at, int size) {
   std::uint32_t value = 0;
@@ -43,23 +40,23 @@ std::vector<std::uint8_t> encodeBmp(const SpanImage& image, double pixel_width_m
   const std::size_t size = pixels_at + row_bytes * image.height;
   std::vector<std::uint8_t> bytes;
   bytes.reserve(size);
-  put(bytes, 'B' | 'M' << 8, 2);
-  put(bytes, size, 4);
-  put(bytes, 0, 4);
-  put(bytes, pixels_at, 4);
-  put(bytes, info_header_bytes, 4);
-  put(bytes, image.width, 4);
-  put(bytes, image.height, 4);
-  put(bytes, 1, 2);  // planes
-  put(bytes, 1, 2);  // bits a pixel
-  put(bytes, 0, 4);  // uncompressed
-  put(bytes, row_bytes * image.height, 4);
-  put(bytes, perMetre(pixel_width_mm), 4);
-  put(bytes, perMetre(pixel_height_mm), 4);
-  put(bytes, 2, 4);  // colours
-  put(bytes, 2, 4);
-  put(bytes, 0x000000, 4);
-  put(bytes, 0xffffff, 4);
+  putLittleEndian(bytes, 'B' | 'M' << 8, 2);
+  putLittleEndian(bytes, size, 4);
+  putLittleEndian(bytes, 0, 4);
+  putLittleEndian(bytes, pixels_at, 4);
+  putLittleEndian(bytes, info_header_bytes, 4);
+  putLittleEndian(bytes, image.width, 4);
+  putLittleEndian(bytes, image.height, 4);
+  putLittleEndian(bytes, 1, 2);  // planes
+  putLittleEndian(bytes, 1, 2);  // bits a pixel
+  putLittleEndian(bytes, 0, 4);  // uncompressed
+  putLittleEndian(bytes, row_bytes * image.height, 4);
+  putLittleEndian(bytes, perMetre(pixel_width_mm), 4);
+  putLittleEndian(bytes, perMetre(pixel_height_mm), 4);
+  putLittleEndian(bytes, 2, 4);  // colours
+  putLittleEndian(bytes, 2, 4);
+  putLittleEndian(bytes, 0x000000, 4);
+  putLittleEndian(bytes, 0xffffff, 4);
   bytes.resize(size);
   for (std::uint32_t y = 0; y < image.height; ++y) {
     std::uint8_t* row = bytes.data() + pixels_at + row_bytes * (image.height - 1 - y);

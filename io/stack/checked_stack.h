@@ -45,9 +45,6 @@ struct CheckedLayer {
 /// What a layer has where no material has its colour. It counts as printed.
 inline constexpr std::uint32_t stray_value = 0xfffffffe;
 
-/// Expands a box of columns, rows and layers by the printed pixels of layer `z`.
-void expandByPrinted(openvdb::CoordBBox& box, const SpanImage& image, int z);
-
 /// What all layers have.
 struct StackTotals {
   std::map<std::uint32_t, std::uint64_t> voxels;  ///< by value: material, or colour of images

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <utility>
 
+#include "io/file/little_endian.h"
 #include "io/file/xml_reader.h"
 #include "io/image/png_decoder.h"
 #include "io/image/png_spans.h"
@@ -41,10 +42,6 @@ std::string channels(const std::array<std::uint8_t, 4>& colour) {
   for (const std::uint8_t channel : colour)
     text += (text.empty() ? "" : " ") + std::to_string(channel);
   return text;
-}
-
-void putLittleEndian(std::vector<std::uint8_t>& bytes, std::uint32_t value, int size) {
-  for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> 8 * i));
 }
 
 void putFloat(std::vector<std::uint8_t>& bytes, double value) {

@@ -11,10 +11,9 @@ namespace vdbdither {
 /// are full where they are printed.
 ///
 /// @param layout  that of the slices
-/// @param dose    what a full pixel is lit with, over the least that hardens: the level of a share
-/// s
-///                is then 255 · dose^(s − 1), so that the resin hardens to the same share of the
-///                layer's depth. Levels rise in proportion without it.
+/// @param dose    ratio of the dose of a full pixel to the minimum dose that hardens the resin. The
+///                level of a share s is 255 · dose^(s − 1), which hardens the same share of the
+///                depth of the layer. Without it the level is 255 · s
 ///
 /// Source: Jacobs: Rapid Prototyping & Manufacturing, SME 1992, the working curve: the depth of
 /// cure rises with the logarithm of the dose.

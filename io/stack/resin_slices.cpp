@@ -18,9 +18,11 @@ void ResinSlices::declare(Options& options) {
   options.flag(format_ + "-grey", grey_,
                "Writes the share of each voxel that lies within the surface as a grey level, in "
                "place of the dither; needs normals");
-  options.number(format_ + "-dose", dose_, {1.01, 1000},
-                 "Dose of a full pixel over the least that hardens, for grey levels along the "
-                 "working curve of the resin; in proportion to the shares without it");
+  options.number(
+      format_ + "-dose", dose_, {1.01, 1000},
+      "Ratio of the dose of a full pixel to the minimum dose that hardens the resin. Grey "
+      "levels then follow the working curve of the resin. Without it they are "
+      "proportional to the shares");
   options.onlyIf([this] { return grey_; });
 }
 

@@ -370,6 +370,20 @@ SpanImage blankSlice(const SliceLayout& layout) {
   return image;
 }
 
+void expandByPrinted(openvdb::CoordBBox& box, const SpanImage& image, int z) {
+  for (std::uint32_t y = 0; y < image.height; ++y) {
+    const std::span<const Span> row = image.row(y);
+    std::size_t first = 0;
+    while (first < row.size() && row[first].value == 0) ++first;
+    if (first == row.size()) continue;
+    std::size_t last = row.size() - 1;
+    while (row[last].value == 0) --last;
+    const auto at = static_cast<int>(y);
+    box.expand({first == 0 ? 0 : static_cast<int>(row[first - 1].end), at, z});
+    box.expand({static_cast<int>(row[last].end) - 1, at, z});
+  }
+}
+
 SpanImage onlyValue(SpanImage slice, std::uint32_t value) {
   for (Span& span : slice.spans) span.value = span.value == value ? 1 : 0;
   return slice;

@@ -48,6 +48,9 @@ SpanImage blankSlice(const SliceLayout& layout);
 /// Whether no voxel of it is printed.
 bool isBlank(const SpanImage& slice);
 
+/// Expands a box of columns, rows and layers by the printed pixels of layer `z`.
+void expandByPrinted(openvdb::CoordBBox& box, const SpanImage& image, int z);
+
 /// 1 where `slice` has this value, else 0.
 SpanImage onlyValue(SpanImage slice, std::uint32_t value);
 

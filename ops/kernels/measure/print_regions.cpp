@@ -7,6 +7,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "ops/kernels/leaf/disjoint_sets.h"
 #include "ops/kernels/measure/touching_spans.h"
 
 namespace vdbdither {

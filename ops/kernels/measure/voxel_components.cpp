@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "ops/kernels/leaf/disjoint_sets.h"
 #include "ops/kernels/measure/touching_spans.h"
 
 namespace vdbdither {

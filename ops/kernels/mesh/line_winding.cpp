@@ -4,7 +4,7 @@
 #include <numeric>
 #include <utility>
 
-#include "ops/kernels/mesh/triangle_groups.h"
+#include "ops/kernels/leaf/disjoint_sets.h"
 #include "ops/kernels/mesh/winding_number.h"
 
 namespace vdbdither {
@@ -59,13 +59,13 @@ LineWinding::LineWinding(const Mesh& mesh, const MeshEdges& edges,
                          const std::vector<BoxTree::Box>& boxes)
     : mesh_(mesh) {
   const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
-  TriangleGroups bodies(count);
+  DisjointSets bodies(count);
   for (std::uint32_t e = 0; e < edges.size(); ++e)
     for (const std::uint32_t half : edges.halves(e)) bodies.join(edges.halves(e)[0] / 3, half / 3);
   std::vector<std::uint32_t> place(count);
   std::vector<std::vector<std::uint32_t>> members;
   for (std::uint32_t t = 0; t < count; ++t) {
-    const std::uint32_t body = bodies.of(t);
+    const std::uint32_t body = bodies.find(t);
     if (body == t) {
       place[t] = static_cast<std::uint32_t>(members.size());
       members.emplace_back();

@@ -12,11 +12,11 @@
 #include <optional>
 #include <utility>
 
+#include "ops/kernels/leaf/disjoint_sets.h"
 #include "ops/kernels/mesh/box_tree.h"
 #include "ops/kernels/mesh/line_winding.h"
 #include "ops/kernels/mesh/mesh_edges.h"
 #include "ops/kernels/mesh/progress_part.h"
-#include "ops/kernels/mesh/triangle_groups.h"
 #include "ops/kernels/mesh/wall_cutter.h"
 
 namespace vdbdither {
@@ -51,7 +51,7 @@ class Walls {
     if (length > 0) normal /= length;
     return {normal, normal.dot(a)};
   }
-  [[nodiscard]] TriangleGroups findPatches() const;
+  [[nodiscard]] DisjointSets findPatches() const;
   /// Calls visit(other) for each triangle that may intersect one, until it returns false.
   template <class Visit>
   bool visitIntersecting(std::uint32_t triangle, const Visit& visit) const;
@@ -63,7 +63,7 @@ class Walls {
   }
   void addCuts(std::uint32_t triangle, std::uint32_t by, std::vector<WallCut>& cuts) const;
   [[nodiscard]] std::vector<char> findCrossed() const;
-  [[nodiscard]] std::vector<std::uint32_t> largestOfPatches(TriangleGroups& patches) const;
+  [[nodiscard]] std::vector<std::uint32_t> largestOfPatches(DisjointSets& patches) const;
   [[nodiscard]] std::vector<Left> cutCrossed(const LineWinding& winding) const;
 
   const Mesh& mesh_;
@@ -93,8 +93,8 @@ Walls::Walls(const Mesh& mesh)
 }
 
 /// Joins the triangles that meet, two alone, at an edge, unless one of them is crossed.
-TriangleGroups Walls::findPatches() const {
-  TriangleGroups patches(count_);
+DisjointSets Walls::findPatches() const {
+  DisjointSets patches(count_);
   for (std::uint32_t e = 0; e < edges_.size(); ++e) {
     const auto halves = edges_.halves(e);
     if (halves.size() == 2 && crossed_[halves[0] / 3] == 0 && crossed_[halves[1] / 3] == 0)
@@ -219,7 +219,7 @@ std::vector<char> Walls::findCrossed() const {
 }
 
 /// Returns the largest triangle of each patch: of what hangs together without being crossed.
-std::vector<std::uint32_t> Walls::largestOfPatches(TriangleGroups& patches) const {
+std::vector<std::uint32_t> Walls::largestOfPatches(DisjointSets& patches) const {
   constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> largest;
   std::vector<std::uint32_t> place(count_, none);
@@ -227,7 +227,7 @@ std::vector<std::uint32_t> Walls::largestOfPatches(TriangleGroups& patches) cons
   for (std::uint32_t t = 0; t < count_; ++t) {
     if (crossed_[t] != 0) continue;
     const double own = (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).length();
-    std::uint32_t& at = place[patches.of(t)];
+    std::uint32_t& at = place[patches.find(t)];
     if (at == none) {
       at = static_cast<std::uint32_t>(largest.size());
       largest.push_back(t);
@@ -263,7 +263,7 @@ std::vector<Walls::Left> Walls::cutCrossed(const LineWinding& winding) const {
 SwallowedWalls Walls::find() {
   SwallowedWalls walls;
   crossed_ = findCrossed();
-  TriangleGroups patches = findPatches();
+  DisjointSets patches = findPatches();
   const std::vector<std::uint32_t> largest = largestOfPatches(patches);
   const bool none_crossed = std::find(crossed_.begin(), crossed_.end(), 1) == crossed_.end();
   if (none_crossed && largest.size() < 2) return walls;
@@ -276,11 +276,12 @@ SwallowedWalls Walls::find() {
     is_surface[i] =
         WallCutter(winding, planes_[t].normal, true).isSurface(middleOf(wholeOf(t))) ? 1 : 0;
   });
-  for (std::size_t i = 0; i < largest.size(); ++i) surface[patches.of(largest[i])] = is_surface[i];
+  for (std::size_t i = 0; i < largest.size(); ++i)
+    surface[patches.find(largest[i])] = is_surface[i];
 
   walls.hidden.assign(count_, false);
   for (std::uint32_t t = 0; t < count_; ++t) {
-    if (crossed_[t] != 0 || surface[patches.of(t)] != 0) continue;
+    if (crossed_[t] != 0 || surface[patches.find(t)] != 0) continue;
     walls.hidden[t] = true;
     ++walls.swallowed;
   }

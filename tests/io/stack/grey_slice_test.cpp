@@ -98,11 +98,11 @@ TEST(GreySlice, LevelsFollowTheWorkingCurveOfTheResin) {
     const std::uint32_t share = valueAt(linear, x, 4);
     const std::uint32_t level = valueAt(cured, x, 4);
     if (share == 0 || share == 255) {
-      // The least share has the least dose that hardens.
+      // The smallest share has the minimum dose that hardens.
       EXPECT_TRUE(level == share || (share == 0 && level == 32));
       continue;
     }
-    // The depth of cure is the logarithm of the dose, 1 at full and 0 at the least that hardens.
+    // The depth of cure follows the logarithm of the dose: 1 at the full dose, 0 at the minimum.
     EXPECT_NEAR(std::log(level / 255.0 * 8) / std::log(8), share / 255.0, 0.01);
     ++seen;
   }
