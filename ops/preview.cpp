@@ -92,9 +92,13 @@ class Preview : public Tool {
 
 extern const ToolInfo preview;
 const ToolInfo preview{
-    "preview", "A page to look through a stack of slices, in one HTML file",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign ! slice-export out\n"
-    "preview out out.html",
-    []() -> std::unique_ptr<Tool> { return std::make_unique<Preview>(); }};
+    .name = "preview",
+    .summary = "A page to look through a stack of slices, in one HTML file",
+    .example =
+        "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! material-assign ! slice-export "
+        "out\n"
+        "preview out out.html",
+    .make = []() -> std::unique_ptr<Tool> { return std::make_unique<Preview>(); },
+    .takes_run_options = true};
 
 }  // namespace vdbdither

@@ -78,8 +78,21 @@ class SliceExport : public Sink {
     overwrite_.declare(options, "the stack");
   }
 
+  void makePiece(const std::filesystem::path& folder) override {
+    if (frame_.crop) {
+      throw UsageError(
+          "--crop: the frame of the slices follows from all layers, and a piece has some; leave it "
+          "out");
+    }
+    if (!page_name_.empty())
+      throw UsageError("--page: a piece has no page; leave it out, and use preview afterwards");
+    part_ = StackPart::piece;
+    target_ = folder;
+  }
+
   void plan(const Schema& in) override {
     schema_ = in;
+    if (part_ == StackPart::whole) target_ = folder_;
     if (in.lattice.box.empty())
       throw DataError("there is nothing to slice: the lattice has no voxels");
     planFormat();
@@ -87,8 +100,10 @@ class SliceExport : public Sink {
     planMaterials();
     planColours();
     planNames();
-    StackOutput::check(folder_, overwrite_.overwrite,
-                       [this](const std::string& text) { report().warn(text); });
+    if (part_ == StackPart::whole) {
+      StackOutput::check(folder_, overwrite_.overwrite,
+                         [this](const std::string& text) { report().warn(text); });
+    }
     printer_ = printerProfileOf(in);
     // Of a part that is cropped the place is not known yet.
     const auto warn = [this](const std::string& text) {
@@ -111,10 +126,10 @@ class SliceExport : public Sink {
     // Measured on dithered spheres, per leaf at the surface and per slice. A file of a folder
     // wastes half a block of the disk.
     const double leaves = schema_.footprint.at_surface;
-    if (leaves == 0) return {folder_, 0};
+    if (leaves == 0) return {target_.string(), 0};
     const double per_leaf = format_->bytes_per_leaf * filesOfLayer();
     const double per_slice = 500 + (namesArchive(folder_) ? 0 : 2048 * filesOfLayer());
-    return {folder_, leaves * per_leaf + schema_.lattice.layers().size() * per_slice};
+    return {target_.string(), leaves * per_leaf + schema_.lattice.layers().size() * per_slice};
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
@@ -132,8 +147,8 @@ class SliceExport : public Sink {
     if (frame_.crop) {
       if (!spool_) spool_.emplace(std::filesystem::path(folder_).parent_path());
       if (spool_->size() == 0) first_kept_ = in.core.begin;
-    } else if (!writer_) {
-      begin();
+    } else {
+      if (!writer_) begin();
       checkWithin(in);
     }
     inGroups(in.core, [&](ZRange layers) {
@@ -143,6 +158,11 @@ class SliceExport : public Sink {
         add(layers, slices(in, layers, stack_.layout), in.grids);
       }
     });
+  }
+
+  void takePiece(const std::filesystem::path& folder, ZRange /*core*/) override {
+    if (!writer_) begin();
+    writer_->takePiece(folder);
   }
 
   void finish() override {
@@ -336,7 +356,7 @@ class SliceExport : public Sink {
   }
 
   void begin() {
-    writer_.emplace(folder_, stack_, names_, *encoder_, blankLayers());
+    writer_.emplace(target_, stack_, names_, *encoder_, blankLayers(), part_);
     if (!page_name_.empty()) page_.emplace(schema_.lattice.layers(), pageStack(folder_, stack_));
   }
 
@@ -376,6 +396,8 @@ class SliceExport : public Sink {
   }
 
   std::string folder_;
+  std::filesystem::path target_;  ///< `folder_`, or that of a piece
+  StackPart part_ = StackPart::whole;
   std::string format_name_ = "png";
   std::string background_ = "0,0,0,255";
   SliceNames names_{"slice_", 5, 0};

@@ -553,9 +553,12 @@ std::string Verify::plainText() const {
 
 extern const ToolInfo verify;
 const ToolInfo verify{
-    "verify", "Whether a printer would take a stack of slices, and whether it is the part",
-    "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! write part.vdb ! slice-export out\n"
-    "verify out --against part.vdb",
-    []() -> std::unique_ptr<Tool> { return std::make_unique<Verify>(); }};
+    .name = "verify",
+    .summary = "Whether a printer would take a stack of slices, and whether it is the part",
+    .example =
+        "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! write part.vdb ! slice-export out\n"
+        "verify out --against part.vdb",
+    .make = []() -> std::unique_ptr<Tool> { return std::make_unique<Verify>(); },
+    .takes_run_options = true};
 
 }  // namespace vdbdither

@@ -1,4 +1,5 @@
 #include <array>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <unistd.h>
@@ -12,6 +13,7 @@
 #include "io/mesh/mesh_format.h"
 #include "io/stack/slice_format.h"
 #include "io/vdb/frames.h"
+#include "io/vdb/slab_reader.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/option_groups.h"
@@ -59,9 +61,16 @@ class WriteOperator : public Sink {
     overwrite_.declare(options, "the file");
   }
 
+  void makePiece(const std::filesystem::path& folder) override {
+    if (isPipe())
+      throw UsageError("what goes into a pipe cannot be made in pieces; name a file with -o");
+    piece_ = folder;
+  }
+
   void plan(const Schema& in) override {
     schema_ = in;
     if (in.grids.empty()) throw UsageError("there is no grid to write");
+    if (piece_) return;
     if (!isPipe()) {
       refuseOtherFormats();
       StagedOutput::check(path_, StagedOutput::Kind::file, overwrite_.overwrite);
@@ -88,7 +97,7 @@ class WriteOperator : public Sink {
       const double unpacked = half_ ? 0.5 : 1;
       per_leaf += leafBytes(grid) * (bits ? 1.1 : noise ? unpacked : packed);
     }
-    return {path_, schema_.footprint.total * per_leaf};
+    return {piece_ ? piece_->string() : path_, schema_.footprint.total * per_leaf};
   }
   [[nodiscard]] std::optional<Work> work() const override {
     double bytes = 0;
@@ -107,6 +116,13 @@ class WriteOperator : public Sink {
     }
   }
 
+  void takePiece(const std::filesystem::path& folder, ZRange core) override {
+    SlabReader piece((folder / piece_name).string(), {});
+    if (written_.empty()) written_.begin = core.begin;
+    written_.end = core.end;
+    for (const auto& [name, grid] : piece.read(core)) pieces_[name].push_back({grid, core});
+  }
+
   void finish() override {
     if (frames_) {
       beginFrames();
@@ -121,11 +137,19 @@ class WriteOperator : public Sink {
       contents.metadata[layers_key] =
           std::to_string(written_.begin) + " " + std::to_string(written_.end);
     }
-    writeVdb(output_->path(), contents, codec_, path_, half_);
-    output_->commit();
+    if (piece_) {
+      std::filesystem::create_directory(*piece_);
+      writeVdb(*piece_ / piece_name, contents, codec_, *piece_ / piece_name, half_);
+    } else {
+      writeVdb(output_->path(), contents, codec_, path_, half_);
+      output_->commit();
+    }
   }
 
  private:
+  /// The file of a piece.
+  static constexpr const char* piece_name = "piece.vdb";
+
   [[nodiscard]] bool isPipe() const { return path_.empty() || path_ == "-"; }
 
   void refuseOtherFormats() const {
@@ -147,6 +171,7 @@ class WriteOperator : public Sink {
   VdbCodec codec_ = VdbCodec::blosc;
   bool half_ = false;
   OverwriteOption overwrite_;
+  std::optional<std::filesystem::path> piece_;  ///< the folder of a piece to make
   Schema schema_;
   std::optional<FrameWriter> frames_;
   bool begun_ = false;

@@ -314,14 +314,28 @@ void StagedOutput::removeLeftovers() const {
   }
 }
 
-void StagedOutput::write(const std::string& name, std::span<const std::uint8_t> bytes) const {
+fs::path StagedOutput::placeOf(const std::string& name) const {
   if (const auto problem = relativePathProblem(name))
     throw DataError("cannot write " + quoted(shown_ / name) + ": the name " + *problem);
-  const std::shared_lock naming(Written::all().naming);
-  const fs::path path = partial_ / name;
+  fs::path path = partial_ / name;
   std::error_code error;
   if (path.parent_path() != partial_) fs::create_directories(path.parent_path(), error);
   if (error) fail("make", (shown_ / name).parent_path(), error.value());
+  return path;
+}
+
+void StagedOutput::link(const std::string& name, const fs::path& from) const {
+  const std::shared_lock naming(Written::all().naming);
+  const fs::path path = placeOf(name);
+  std::error_code error;
+  fs::create_hard_link(from, path, error);
+  if (error && error != std::errc::file_exists) fs::copy_file(from, path, error);
+  if (error) fail("write", shown_ / name, error.value());
+}
+
+void StagedOutput::write(const std::string& name, std::span<const std::uint8_t> bytes) const {
+  const std::shared_lock naming(Written::all().naming);
+  const fs::path path = placeOf(name);
   writeBytes(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666), bytes,
              shown_ / name);
 }

@@ -50,6 +50,10 @@ class StagedOutput {
   /// the user will see it, also where `name` is no path below the folder or is written already.
   void write(const std::string& name, std::span<const std::uint8_t> bytes) const;
 
+  /// Puts the file `from` under a name of the folder too, without a copy of its bytes where both
+  /// lie on one file system that can. Throws DataError as `write` does.
+  void link(const std::string& name, const std::filesystem::path& from) const;
+
   /// Gives it its name, in place of what had it before, once it is on the disk: at every moment the
   /// old one or the new one is there, whole, also if the machine stops. (Where the file system
   /// cannot exchange folders, a run that is killed in this moment leaves the old one for
@@ -65,6 +69,8 @@ class StagedOutput {
   static void abandonAll(std::chrono::milliseconds patience);
 
  private:
+  /// The path of a file of the folder, whose own folder is made.
+  [[nodiscard]] std::filesystem::path placeOf(const std::string& name) const;
   void begin();
   void removeLeftovers() const;
   void commitFolder();

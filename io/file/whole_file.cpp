@@ -6,6 +6,7 @@
 #include <system_error>
 #include <unistd.h>
 
+#include "io/file/files_read.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -46,6 +47,7 @@ std::vector<std::uint8_t> readWholeFile(const std::filesystem::path& path, const
   if (!S_ISREG(status.st_mode)) throw DataError(shown + " is not an ordinary file");
   const auto size = static_cast<std::uint64_t>(status.st_size);
   if (size > most_bytes) throw DataError(tooLarge(shown, size, most_bytes));
+  noteFileRead(path);
   std::vector<std::uint8_t> bytes(size);
   for (std::size_t at = 0; at < bytes.size();) {
     const ssize_t count = ::read(file.number(), bytes.data() + at, bytes.size() - at);

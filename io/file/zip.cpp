@@ -11,6 +11,7 @@
 #include <zlib.h>
 
 #include "io/file/file_name.h"
+#include "io/file/files_read.h"
 #include "io/file/whole_file.h"
 #include "vdbdither/model/errors.h"
 
@@ -126,6 +127,7 @@ ZipReader::ZipReader(const std::filesystem::path& path) : shown_("'" + path.stri
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none))
     throw DataError(shown_ + " is not an ordinary file");
+  noteFileRead(path);
   takeOver(unzOpen64(path.c_str()));
 }
 

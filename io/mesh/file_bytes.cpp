@@ -10,6 +10,7 @@
 #include <unistd.h>
 #include <utility>
 
+#include "io/file/files_read.h"
 #include "io/mesh/mesh_file.h"
 #include "vdbdither/model/interrupt.h"
 
@@ -56,6 +57,7 @@ void FileBytes::open() {
            (std::filesystem::path(path_) / "*.stl").string());
   if (!S_ISREG(status.st_mode))
     refuse("a pipe or device; mesh input needs a regular file, save it first");
+  noteFileRead(path_);
   size_ = static_cast<std::size_t>(status.st_size);
   changed_ = status.st_mtim;
   if (size_ == 0) return;

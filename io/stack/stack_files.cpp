@@ -1,6 +1,7 @@
 #include "io/stack/stack_files.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "io/file/file_name.h"
 #include "io/file/whole_file.h"
@@ -69,6 +70,15 @@ void StackOutput::write(const std::string& name, std::span<const std::uint8_t> b
     zip_->add(name, bytes);
   } else {
     staged_.write(name, bytes);
+  }
+}
+
+void StackOutput::copy(const std::string& name, const fs::path& from) {
+  constexpr auto unlimited = std::numeric_limits<std::uint64_t>::max();
+  if (zip_) {
+    write(name, readWholeFile(from, "'" + from.string() + "'", unlimited));
+  } else {
+    staged_.link(name, from);
   }
 }
 

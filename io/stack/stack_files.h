@@ -40,6 +40,8 @@ class StackOutput {
 
   /// Writes a file. `name` is a path below the stack with '/' between folders. Throws DataError.
   void write(const std::string& name, std::span<const std::uint8_t> bytes);
+  /// Writes a file whose bytes are those of the file `from`. Throws DataError.
+  void copy(const std::string& name, const std::filesystem::path& from);
   void commit();
 
  private:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -9,7 +10,9 @@
 
 #include <tbb/parallel_for.h>
 
+#include "io/file/little_endian.h"
 #include "io/image/png_spans.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 
@@ -74,6 +77,78 @@ void StackPreview::add(int z, SpanImage&& slice, std::uint64_t filled) {
     fullest_count_ = filled;
     fullest_ = std::move(slice);
   }
+}
+
+std::vector<std::uint8_t> StackPreview::part() const {
+  const std::size_t rays = static_cast<std::size_t>(columns_) * fineness;
+  std::vector<std::uint8_t> bytes;
+  std::vector<std::size_t> rows;
+  for (std::size_t row = 0; row < hits_.size() / rays; ++row) {
+    const Hit* hits = hits_.data() + row * rays;
+    if (std::any_of(hits, hits + rays, [](const Hit& hit) { return hit.value != 0; }))
+      rows.push_back(row);
+  }
+  putLittleEndian(bytes, rows.size(), 4);
+  for (const std::size_t row : rows) {
+    putLittleEndian(bytes, row, 4);
+    for (std::size_t ray = row * rays; ray < (row + 1) * rays; ++ray) {
+      putLittleEndian(bytes, std::bit_cast<std::uint32_t>(hits_[ray].depth_mm), 4);
+      putLittleEndian(bytes, hits_[ray].value, 4);
+    }
+  }
+  putLittleEndian(bytes, fullest_count_, 8);
+  if (fullest_count_ == 0) return bytes;
+  for (std::uint32_t y = 0; y < fullest_.height; ++y) {
+    putLittleEndian(bytes, fullest_.row(y).size(), 4);
+    for (const Span& span : fullest_.row(y)) {
+      putLittleEndian(bytes, span.end, 4);
+      putLittleEndian(bytes, span.value, 4);
+    }
+  }
+  return bytes;
+}
+
+void StackPreview::addPart(std::span<const std::uint8_t> bytes) {
+  const auto number = [&](int size) {
+    if (bytes.size() < static_cast<std::size_t>(size)) throw DataError("is cut short");
+    const std::uint64_t value = littleEndian(bytes, size);
+    bytes = bytes.subspan(static_cast<std::size_t>(size));
+    return value;
+  };
+  const auto refuse = [] { throw DataError("is not of a piece of this stack"); };
+  const auto value = [&] {
+    const auto index = static_cast<std::uint32_t>(number(4));
+    if (index >= palette_.size()) refuse();
+    return index;
+  };
+  const std::size_t rays = static_cast<std::size_t>(columns_) * fineness;
+  for (std::uint64_t rows = number(4); rows > 0; --rows) {
+    const std::uint64_t row = number(4);
+    if (row >= hits_.size() / rays) refuse();
+    for (std::size_t ray = row * rays; ray < (row + 1) * rays; ++ray) {
+      hits_[ray].depth_mm = std::bit_cast<float>(static_cast<std::uint32_t>(number(4)));
+      hits_[ray].value = value();
+    }
+  }
+  const std::uint64_t count = number(8);
+  if (count > 0) {
+    SpanImage slice{width_, height_, {0}, {}};
+    for (std::uint32_t y = 0; y < height_; ++y) {
+      std::uint32_t begin = 0;
+      for (std::uint64_t spans = number(4); spans > 0; --spans) {
+        const auto end = static_cast<std::uint32_t>(number(4));
+        if (end <= begin || end > width_) refuse();
+        slice.spans.push_back({begin = end, value()});
+      }
+      if (begin != width_) refuse();
+      slice.row_begin.push_back(slice.spans.size());
+    }
+    if (count > fullest_count_) {
+      fullest_count_ = count;
+      fullest_ = std::move(slice);
+    }
+  }
+  if (!bytes.empty()) refuse();
 }
 
 void StackPreview::look(const SpanImage& slice, Hit* hits) {

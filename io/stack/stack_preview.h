@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <openvdb/math/Vec3.h>
@@ -24,6 +25,12 @@ class StackPreview {
   /// Adds layer `z`, of which `filled` voxels are not empty. Layers come in rising order; missing
   /// ones are empty.
   void add(int z, SpanImage&& slice, std::uint64_t filled);
+
+  /// What the layers that were added show, as bytes for `addPart`.
+  [[nodiscard]] std::vector<std::uint8_t> part() const;
+  /// Adds the layers of a `part` of the same stack. Throws DataError in words that go on from the
+  /// name of what holds it.
+  void addPart(std::span<const std::uint8_t> bytes);
 
   /// The picture as colours, at most 1200 x 1000 pixels.
   [[nodiscard]] SpanImage picture() const;

@@ -1,6 +1,7 @@
 #include "io/stack/stack_writer.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -31,44 +32,94 @@ struct StackWriter::Layer {
   std::vector<SliceFile> files;
   std::vector<std::string> sha256;    ///< of each of the files
   std::vector<std::uint64_t> voxels;  ///< of each material
+  /// Of a layer of a piece, in place of an image: the files that it has already, by their paths.
+  std::vector<std::filesystem::path> made = {};
 };
 
 StackWriter::StackWriter(const std::filesystem::path& target, Manifest stack, SliceNames names,
-                         const SliceEncoder& encoder, BlankLayers blank)
+                         const SliceEncoder& encoder, BlankLayers blank, StackPart part)
     : stack_(std::move(stack)),
       names_(std::move(names)),
       encoder_(encoder),
       blank_(blank),
+      part_(part),
       lowest_(stack_.lattice.layers().begin),
       output_(target),
       preview_(stack_.lattice.pitch_mm, stack_.layout.width(), stack_.layout.height(),
                stack_.lattice.layers(), displayColours(stack_.materials)) {
   stack_.voxels.assign(stack_.materials.size(), 0);
-  if (encoder.keepsBlank()) blank_.keep = true;
+  if (encoder.keepsBlank() || part == StackPart::piece) blank_.keep = true;
 }
 
-void StackWriter::add(ZRange layers, std::vector<SpanImage> images, const Grids& grids) {
+void StackWriter::expect(ZRange layers) {
   if (known_.empty()) known_ = {layers.begin, layers.begin};
   if (layers.begin != known_.end) {
     throw DataError("layers " + std::to_string(known_.end) + " to " +
                     std::to_string(layers.begin - 1) + " are missing");
   }
   known_.end = layers.end;
+}
+
+void StackWriter::keep(Layer&& layer, std::vector<Layer>& ready) {
+  if (stack_.layers.empty() && ready.empty() && beginsAtBottom()) {
+    stack_.cropped_below = std::exchange(waiting_, 0);
+    lowest_ = layer.z;
+  }
+  release(layer.z, ready);
+  ready.push_back(std::move(layer));
+}
+
+void StackWriter::add(ZRange layers, std::vector<SpanImage> images, const Grids& grids) {
+  expect(layers);
   std::vector<Layer> ready;
   for (int z = layers.begin; z < layers.end; ++z) {
     SpanImage& image = images[static_cast<std::size_t>(z - layers.begin)];
     if (!blank_.keep && isBlank(image)) {
       ++waiting_;
-      continue;
+    } else {
+      keep({z, std::move(image), {}, {}, {}}, ready);
     }
-    if (stack_.layers.empty() && ready.empty() && beginsAtBottom()) {
-      stack_.cropped_below = std::exchange(waiting_, 0);
-      lowest_ = z;
-    }
-    release(z, ready);
-    ready.push_back({z, std::move(image), {}, {}, {}});
   }
   encodeAll(std::move(ready), grids);
+}
+
+void StackWriter::takePiece(const std::filesystem::path& folder) {
+  const StackInput files(folder);
+  const Manifest made = readManifest(files, EditedStack::refused, {});
+  constexpr auto unlimited = std::numeric_limits<std::uint64_t>::max();
+  const std::string shown = "'" + files.shown(stack_piece_name) + "'";
+  const std::vector<std::uint8_t> bytes = files.read(stack_piece_name, unlimited);
+  std::vector<Layer> ready;
+  try {
+    const StackPiece piece = stackPieceOf(bytes);
+    if (piece.layers != made.layers || piece.materials != stack_.materials.size() ||
+        made.format != stack_.format || made.layout.width() != stack_.layout.width() ||
+        made.layout.height() != stack_.layout.height())
+      throw DataError("is not of a piece of this stack");
+    expect(piece.layers);
+    auto slice = made.slices.begin();
+    for (int z = piece.layers.begin; z < piece.layers.end; ++z) {
+      const auto voxels = piece.voxelsOf(z);
+      Layer layer{z, {}, {}, {}, {voxels.begin(), voxels.end()}};
+      for (; slice != made.slices.end() && slice->layer == z; ++slice) {
+        layer.files.push_back({slice->file, slice->material, {}});
+        layer.sha256.push_back(slice->sha256);
+        layer.made.push_back(folder / slice->file);
+      }
+      if (layer.made.empty()) throw DataError("tells of a layer that has no slice");
+      const bool is_blank =
+          std::all_of(voxels.begin(), voxels.end(), [](auto count) { return count == 0; });
+      if (!blank_.keep && is_blank) {
+        ++waiting_;
+      } else {
+        keep(std::move(layer), ready);
+      }
+    }
+    preview_.addPart(piece.preview);
+  } catch (const DataError& error) {
+    throw DataError(shown + " " + error.what() + "; make the piece again");
+  }
+  encodeAll(std::move(ready), {});
 }
 
 void StackWriter::release(int end, std::vector<Layer>& layers) {
@@ -112,18 +163,39 @@ const Manifest& StackWriter::finish() {
     release(known_.end, blank);
     encodeAll(std::move(blank), {});
   }
-  encoder_.finish(stack_, preview_.picture(), output_);
+  if (part_ == StackPart::piece) {
+    finishPiece();
+  } else {
+    encoder_.finish(stack_, preview_.picture(), output_);
+  }
   output_.commit();
   return stack_;
 }
 
-std::string StackWriter::nameOf(int z) const {
-  return names_.prefix + zeroPadded(names_.first + z - lowest_, names_.digits);
+/// A piece is described by a manifest, whatever the format.
+void StackWriter::finishPiece() {
+  encoder_.SliceEncoder::finish(stack_, preview_.picture(), output_);
+  piece_.layers = stack_.layers;
+  piece_.materials = stack_.materials.size();
+  piece_.preview = preview_.part();
+  output_.write(stack_piece_name, bytesOf(piece_));
+}
+
+std::string StackWriter::nameOf(int z, int lowest) const {
+  return names_.prefix + zeroPadded(names_.first + z - lowest, names_.digits);
 }
 
 void StackWriter::encode(Layer& layer, const Grids& grids) const {
+  const std::string name = nameOf(layer.z, lowest_);
+  if (!layer.made.empty()) {
+    // A piece counts its slices from the bottom of the lattice.
+    const std::string before = nameOf(layer.z, stack_.lattice.layers().begin);
+    for (SliceFile& file : layer.files)
+      file.name.replace(file.name.rfind('/') + 1, before.size(), name);
+    return;
+  }
   layer.voxels = countedVoxels(layer);
-  layer.files = encoder_.encode({layer.z, nameOf(layer.z), layer.image, grids});
+  layer.files = encoder_.encode({layer.z, name, layer.image, grids});
   for (const SliceFile& file : layer.files) layer.sha256.push_back(sha256Of(file.bytes));
 }
 
@@ -149,10 +221,17 @@ void StackWriter::store(Layer& layer) {
   ++stack_.layers.end;
   for (std::size_t i = 0; i < layer.files.size(); ++i) {
     const SliceFile& file = layer.files[i];
-    output_.write(file.name, file.bytes);
+    if (layer.made.empty()) {
+      output_.write(file.name, file.bytes);
+    } else {
+      output_.copy(file.name, layer.made[i]);
+    }
     stack_.slices.push_back({layer.z, file.name, layer.sha256[i], file.material});
   }
   for (std::size_t i = 0; i < layer.voxels.size(); ++i) stack_.voxels[i] += layer.voxels[i];
+  if (part_ == StackPart::piece)
+    piece_.voxels.insert(piece_.voxels.end(), layer.voxels.begin(), layer.voxels.end());
+  if (!layer.made.empty()) return;
   preview_.add(layer.z, std::move(layer.image),
                std::accumulate(layer.voxels.begin(), layer.voxels.end(), std::uint64_t{0}));
 }

@@ -14,6 +14,7 @@
 
 #include <openvdb/io/Archive.h>
 
+#include "io/file/files_read.h"
 #include "io/vdb/archive_digest.h"
 #include "io/vdb/archive_reader.h"
 #include "io/vdb/grid_checks.h"
@@ -133,6 +134,7 @@ std::ifstream openArchive(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path, none)) throw DataError("no such file " + quoted(path));
   if (!std::filesystem::is_regular_file(path, none))
     throw DataError(quoted(path) + " is not a file");
+  noteFileRead(path);
   std::ifstream file(path, std::ios::binary);
   if (!file) throw DataError("cannot read " + quoted(path) + ": " + std::strerror(errno));
   std::string head(archive_head_size, 0);

@@ -41,7 +41,9 @@ double bytesOf(const Schema& schema, const GridNames& names, int layers) {
 /// windows of earlier stages hold; those of this one are added.
 double windowBytes(const StagePlan& stage, const StagePlan& before, int slab_layers,
                    GridNames& shared) {
-  const int all = stage.schema.lattice.layers().size();
+  // A sink takes the layers of the job only.
+  const int all = stage.kind == StagePlan::Kind::sink ? stage.cores.size()
+                                                      : stage.schema.lattice.layers().size();
   const Reach reach = widest(stage.reads);
   const int halo_layers = reach.below + reach.above;
   const int window_layers =

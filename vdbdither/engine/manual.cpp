@@ -244,10 +244,16 @@ Page pageOf(const OperatorInfo& info) {
 }
 
 Page pageOf(const ToolInfo& info) {
-  const std::shared_ptr<Tool> made = info.make();
+  struct Owner {
+    std::unique_ptr<Tool> made;
+    RunOptions run;
+  };
+  const auto owner = std::make_shared<Owner>();
+  owner->made = info.make();
   Page page{std::string(info.name),    "tool", std::string(info.summary),
-            std::string(info.example), {},     made};
-  made->declare(page.options);
+            std::string(info.example), {},     owner};
+  owner->made->declare(page.options);
+  if (info.takes_run_options) owner->run.declareForTool(page.options);
   return page;
 }
 

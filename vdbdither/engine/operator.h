@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -69,6 +70,15 @@ class Sink : public Operator {
   virtual void finish() = 0;
   /// Where its output goes, and how large it will be.
   [[nodiscard]] virtual OutputEstimate output() const { return {}; }
+
+  /// Makes `finish` publish a piece of the output: files in `folder`, which the sink makes when it
+  /// writes. Called before `plan`, with the options read. Throws UsageError where the output cannot
+  /// be made in pieces, as that of most sinks.
+  virtual void makePiece(const std::filesystem::path& folder);
+  /// Takes the piece that `makePiece` made of the layers `core` in another run of the chain, in
+  /// place of their slabs. Pieces come in rising z, and the output is the same, byte for byte.
+  /// Throws DataError.
+  virtual void takePiece(const std::filesystem::path& folder, ZRange core);
 };
 
 /// The registry's entry for an operator: `extern const OperatorInfo material_assign` in

@@ -38,10 +38,24 @@ Grids gridsOver(Input& input, ZRange core) {
   return there.empty() ? Grids{} : input.read(there);
 }
 
+/// Where the sink at `index` keeps its piece.
+std::string outputFolder(std::size_t index, const Stage& stage) {
+  return std::to_string(index) + "-" + stage.name();
+}
+
 }  // namespace
 
 Pipeline::Pipeline(const std::vector<Step>& steps, const FindOperator& find)
     : chain_(steps, find) {}
+
+void Pipeline::makePiece(const std::filesystem::path& folder) {
+  const auto stages = chain_.stages();
+  for (std::size_t index = 0; index < stages.size(); ++index) {
+    Stage& stage = *stages[index];
+    if (!stage.sink()) continue;
+    callNamed(stage.name(), [&] { stage.sink()->makePiece(folder / outputFolder(index, stage)); });
+  }
+}
 
 const JobPlan& Pipeline::plan(Watcher& watcher) {
   watcher_ = &watcher;
@@ -78,6 +92,25 @@ void Pipeline::run() {
     if (workers_[index].window) pushEmpty(index, workers_[index].plan.window.end);
   }
   readInputsToEnd();
+  publish();
+}
+
+void Pipeline::join(std::span<const Piece> pieces) {
+  for (const Piece& piece : pieces) {
+    for (std::size_t index = 0; index < workers_.size(); ++index) {
+      Stage& stage = workers_[index].stage;
+      if (Sink* sink = stage.sink()) {
+        stage.monitor().timed(
+            [&] { sink->takePiece(piece.folder / outputFolder(index, stage), piece.layers); });
+      }
+      stage.monitor().layersDone(piece.layers.size());
+      stage.monitor().progress(0);
+    }
+  }
+  publish();
+}
+
+void Pipeline::publish() {
   for (Worker& worker : workers_) {
     if (Sink* sink = worker.stage.sink()) worker.stage.monitor().timed([&] { sink->finish(); });
   }

@@ -129,6 +129,16 @@ void planTime(JobPlan& plan) {
   plan.seconds = secondsOf(plan);
 }
 
+/// Plans what follows from the stages and the wanted layers.
+void planLayers(JobPlan& plan, const RunOptions& options) {
+  planGrids(plan);
+  planCores(plan);
+  planWindows(plan);
+  planSlabs(plan, options);
+  planOutputs(plan, options);
+  planTime(plan);
+}
+
 }  // namespace
 
 JobPlan planJob(std::span<const std::unique_ptr<Stage>> stages, const RunOptions& options) {
@@ -139,12 +149,14 @@ JobPlan planJob(std::span<const std::unique_ptr<Stage>> stages, const RunOptions
     plan.stages.push_back(stage->plan(plan.stages.empty() ? nothing : plan.stages.back().schema));
   if (options.stream) refuseBarriers(plan);
   plan.layers = parseLayers(options.layers, plan.lattice().layers());
-  planGrids(plan);
-  planCores(plan);
-  planWindows(plan);
-  planSlabs(plan, options);
-  planOutputs(plan, options);
-  planTime(plan);
+  planLayers(plan, options);
+  return plan;
+}
+
+JobPlan planPiece(const JobPlan& whole, ZRange layers, const RunOptions& options) {
+  JobPlan plan = whole;
+  plan.layers = layers;
+  planLayers(plan, options);
   return plan;
 }
 

@@ -15,4 +15,9 @@ namespace vdbdither {
 /// job that does not fit into memory or onto the disk is refused unless `options.explain` is set.
 JobPlan planJob(std::span<const std::unique_ptr<Stage>> stages, const RunOptions& options);
 
+/// The plan of a run that makes only some layers of a job, estimates included.
+/// \param whole   of all layers
+/// \param layers  of the last stage
+JobPlan planPiece(const JobPlan& whole, ZRange layers, const RunOptions& options);
+
 }  // namespace vdbdither

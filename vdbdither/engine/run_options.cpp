@@ -24,7 +24,29 @@ std::string checkedSlab(const std::string& text) {
   return std::to_string(static_cast<int>(layers));
 }
 
+constexpr std::array<Choice<Progress>, 3> progress_styles{
+    {{Progress::bar, "bar", "A line that is overwritten, at a terminal only"},
+     {Progress::json, "json", "A line of JSON each second"},
+     {Progress::openjd, "openjd", "Lines that Open Job Description reads"}}};
+
 }  // namespace
+
+void RunOptions::declareThreads(Options& options) {
+  options.integer("threads", threads, {0, 4096}, "Number of threads; 0 takes all");
+}
+
+void RunOptions::declareWords(Options& options) {
+  options.choice("progress", progress, progress_styles, "How standard error shows the progress");
+  options.flag("quiet", quiet, "Prints only warnings and errors");
+  options.letter('q');
+  options.flag("verbose", verbose, "Prints a line for each stage");
+  options.letter('v');
+}
+
+void RunOptions::declareForTool(Options& options) {
+  declareThreads(options);
+  declareWords(options);
+}
 
 void RunOptions::declare(Options& options) {
   options.file("input", input, "FILE.vdb",
@@ -34,7 +56,7 @@ void RunOptions::declare(Options& options) {
                "Writes this file instead of standard output, where the chain has no sink");
   options.letter('o');
   options.flag("overwrite", overwrite, "Replaces the output if it exists");
-  options.integer("threads", threads, {0, 4096}, "Number of threads; 0 takes all");
+  declareThreads(options);
   options.parsed(
       "slab", "N", [this](const std::string& text) { slab = checkedSlab(text); },
       [this] { return slab; }, "Number of layers worked on at a time, a multiple of 8");
@@ -53,10 +75,7 @@ void RunOptions::declare(Options& options) {
   options.flag("stream", stream, "Refuses operators that need the whole volume at once");
   options.flag("explain", explain, "Prints what the run would do and cost, and stops");
   options.flag("json", json, "Reports time, voxels, bytes and peak memory of each stage as JSON");
-  options.flag("quiet", quiet, "Prints only warnings and errors");
-  options.letter('q');
-  options.flag("verbose", verbose, "Prints a line for each stage");
-  options.letter('v');
+  declareWords(options);
   options.flag("version", version, "Prints the version of the program");
   options.flag("help", help, "Prints this text");
   options.letter('h');

@@ -6,6 +6,13 @@
 
 namespace vdbdither {
 
+/// How a run shows how far it is.
+enum class Progress {
+  bar,     ///< a line that is overwritten, at a terminal only
+  json,    ///< a line of JSON each second
+  openjd,  ///< lines as Open Job Description reads them
+};
+
 /// The options that every operator takes. They apply to the whole job, whichever operator of a
 /// chain they follow.
 struct RunOptions {
@@ -21,10 +28,17 @@ struct RunOptions {
   bool json = false;
   bool quiet = false;
   bool verbose = false;
+  Progress progress = Progress::bar;
   bool help = false;
   bool version = false;
 
   void declare(Options& options);
+  /// The ones of them that a tool takes which works for long.
+  void declareForTool(Options& options);
+
+ private:
+  void declareThreads(Options& options);
+  void declareWords(Options& options);
 };
 
 /// Reads a size such as 512MiB, 4GiB, 2e9 (bytes). Throws UsageError.

@@ -11,7 +11,9 @@ ToolRun::ToolRun(const ToolInfo& info, const std::vector<std::string>& arguments
   callNamed(monitor_.verb(), [&] {
     Options own;
     tool_->declare(own);
-    own.parse(arguments);
+    Options common;
+    if (info.takes_run_options) options_.declareForTool(common);
+    own.parse(arguments, common);
   });
 }
 

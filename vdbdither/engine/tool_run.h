@@ -13,7 +13,7 @@ namespace vdbdither {
 /// A tool with its arguments read.
 class ToolRun {
  public:
-  /// A verb that is a tool; it takes its own options only. Throws UsageError.
+  /// A verb that is a tool. Throws UsageError.
   ToolRun(const ToolInfo& info, const std::vector<std::string>& arguments);
 
   /// The tool that an operator becomes on a file (see `worksOnFile`). It takes the options of every

@@ -3,9 +3,14 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <system_error>
 #include <unistd.h>
 
+#include <nlohmann/json.hpp>
+
 #include "io/file/standard_streams.h"
+#include "vdbdither/engine/json_text.h"
+#include "vdbdither/model/errors.h"
 #include "vdbdither/model/printable.h"
 
 namespace vdbdither {
@@ -27,10 +32,17 @@ std::string clockText(double seconds) {
 }  // namespace
 
 void Console::begin(bool quiet, double box_voxels, double expected_seconds) {
-  terminal_ = !quiet && ::isatty(STDERR_FILENO);
+  terminal_ = style_ == Progress::bar && !quiet && ::isatty(STDERR_FILENO);
   box_voxels_ = box_voxels;
   expected_seconds_ = expected_seconds;
   start_ = last_ = Clock::now();
+  if (style_ != Progress::bar && !teller_.joinable()) {
+    try {
+      teller_ = std::jthread([this](const std::stop_token& stop) { tellEachSecond(stop); });
+    } catch (const std::system_error& error) {
+      throw DataError("cannot start a thread: " + error.code().message());
+    }
+  }
   // The first progress of a stage may take a while to come.
   if (terminal_ && expected_seconds >= 1) {
     std::fprintf(stderr, "\r\033[K%-16s   0 %%  about %s left", "",
@@ -46,10 +58,15 @@ void Console::warn(const std::string& verb, const std::string& text) {
 }
 
 void Console::progress(const std::string& verb, int done, int total, double fraction) {
+  const double share = done == 0 || total == 0 ? fraction : static_cast<double>(done) / total;
+  if (style_ != Progress::bar) {
+    const std::lock_guard lock(mutex_);
+    state_ = {verb, done, total, share};
+    return;
+  }
   const Clock::time_point now = Clock::now();
   if (!terminal_ || now - last_ < std::chrono::milliseconds(100)) return;
   last_ = now;
-  const double share = done == 0 || total == 0 ? fraction : static_cast<double>(done) / total;
   const double seconds = std::chrono::duration<double>(now - start_).count();
   std::fprintf(stderr, "\r\033[K%-16s %3d %%", verb.c_str(), static_cast<int>(100 * share));
   if (done > 0 && share > 0) {
@@ -68,6 +85,44 @@ void Console::print(const std::string& text) {
     std::fputs(printableLines(text).c_str(), stderr);
   } else {
     printData(text.c_str());
+  }
+}
+
+void Console::tellEachSecond(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  while (!stopped_.wait_for(lock, stop, std::chrono::seconds(1), [] { return false; }) &&
+         !stop.stop_requested())
+    tell(state_);
+}
+
+void Console::tell(const State& state) {
+  constexpr double percent = 100;
+  if (style_ == Progress::openjd) {
+    std::array<char, 64> line{};
+    std::snprintf(line.data(), line.size(), "openjd_progress: %.1f\n", percent * state.share);
+    const std::string text = "openjd_status: " + state.verb + "\n" + line.data();
+    std::fputs(text.c_str(), stderr);
+    return;
+  }
+  const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+  nlohmann::ordered_json json{{"stage", state.verb}, {"share", state.share}, {"seconds", seconds}};
+  json["seconds_left"] = nullptr;
+  if (state.share > 0) json["seconds_left"] = seconds * (1 - state.share) / state.share;
+  if (state.total > 0) json["layers"] = {{"done", state.done}, {"all", state.total}};
+  std::fputs((jsonText(json) + "\n").c_str(), stderr);
+}
+
+void Console::end(const char* error) {
+  clear();
+  if (!teller_.joinable()) return;
+  teller_.request_stop();
+  teller_.join();
+  if (error == nullptr) {
+    state_.share = 1;
+    state_.done = state_.total;
+    tell(state_);
+  } else if (style_ == Progress::openjd) {
+    std::fputs(("openjd_fail: " + printable(error) + "\n").c_str(), stderr);
   }
 }
 

@@ -1,16 +1,24 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <stop_token>
 #include <string>
+#include <thread>
 
 #include "vdbdither/engine/monitor.h"
+#include "vdbdither/engine/run_options.h"
 
 namespace vdbdither {
 
-/// Shows at a terminal how a job goes: one line on standard error that is overwritten, with
-/// percent, rate and time left. Without a terminal it only passes warnings and results on.
+/// Shows how a job goes: at a terminal by one line on standard error that is overwritten, with
+/// percent, rate and time left; to a program by lines of `Progress::json` or `Progress::openjd`
+/// (docs/jobs.md), one each second. Otherwise it only passes warnings and results on.
 class Console : public Watcher {
  public:
+  explicit Console(Progress style = Progress::bar) : style_(style) {}
+
   /// \param quiet             no line of progress
   /// \param box_voxels        the voxels of the whole job, for the rate
   /// \param expected_seconds  shown until the first layers are done; 0 if unknown
@@ -22,10 +30,28 @@ class Console : public Watcher {
   void print(const std::string& text) override;
   /// Removes the line.
   void clear();
+  /// Ends the progress: the run came to its end, or failed with `error`.
+  void end(const char* error = nullptr);
 
  private:
   using Clock = std::chrono::steady_clock;
 
+  /// How far the run is.
+  struct State {
+    std::string verb;
+    int done = 0;
+    int total = 0;
+    double share = 0;
+  };
+
+  void tellEachSecond(const std::stop_token& stop);
+  void tell(const State& state);
+
+  Progress style_;
+  std::mutex mutex_;
+  State state_;
+  std::condition_variable_any stopped_;
+  std::jthread teller_;  ///< of lines for programs
   bool shown_ = false;
   bool results_to_error_ = false;
   bool terminal_ = false;

@@ -110,11 +110,11 @@ template <typename Job, typename Function>
 void runReported(Job& job, Console& console, Clock::time_point start, const Function& function) {
   try {
     function();
-  } catch (...) {
-    console.clear();
+  } catch (const std::exception& error) {
+    console.end(error.what());
     throw;
   }
-  console.clear();
+  console.end();
   const RunOptions& options = job.options();
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   if (options.verbose) printStages(job.report(), seconds);
@@ -125,7 +125,7 @@ void runTool(ToolRun&& tool) {
   watchForInterrupts();
   const GrantedThreads threads;
   const Clock::time_point start = Clock::now();
-  Console console;
+  Console console(tool.options().progress);
   console.begin(tool.options().quiet || tool.options().verbose, 0, 0);
   runReported(tool, console, start, [&] { tool.run(console); });
 }
@@ -138,7 +138,7 @@ void runChain(const std::vector<Step>& steps) {
   watchForInterrupts();
   const GrantedThreads threads;
   const Clock::time_point start = Clock::now();
-  Console console;
+  Console console(options.progress);
   console.begin(options.quiet, 0, 0);
   const JobPlan& plan = pipeline.plan(console);
   if (options.explain) {
