@@ -37,6 +37,8 @@ class Merge : public Tool {
                         pieceFolder(opened.folder(), number)});
     }
     pipeline.join(pieces);
+    report().print("'" + folder_ + "': " + std::to_string(pieces.size()) +
+                   (pieces.size() == 1 ? " piece is" : " pieces are") + " joined\n");
     report().count("pieces", static_cast<double>(pieces.size()));
   }
 

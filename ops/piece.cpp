@@ -19,6 +19,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// A folder that is there, and stays if something is in it.
+class PiecesFolder {
+ public:
+  explicit PiecesFolder(fs::path path) : path_(std::move(path)) {
+    std::error_code error;
+    fs::create_directory(path_, error);
+    if (error) throw DataError("cannot make '" + path_.string() + "': " + error.message());
+  }
+  PiecesFolder(const PiecesFolder&) = delete;
+  PiecesFolder& operator=(const PiecesFolder&) = delete;
+  ~PiecesFolder() {
+    std::error_code not_empty;
+    fs::remove(path_, not_empty);
+  }
+
+ private:
+  fs::path path_;
+};
+
 /// Makes pieces of a job that plan wrote. A piece that is there, whole, is left as it is.
 class PieceTool : public Tool {
  public:
@@ -30,12 +49,7 @@ class PieceTool : public Tool {
   void run() override {
     const OpenJob opened(folder_);
     const std::vector<std::size_t> numbers = pieceNumbers(numbers_, opened.job().pieces.size());
-    std::error_code error;
-    fs::create_directory(opened.folder() / pieces_name, error);
-    if (error) {
-      throw DataError("cannot make '" + (opened.folder() / pieces_name).string() +
-                      "': " + error.message());
-    }
+    const PiecesFolder pieces(opened.folder() / pieces_name);
     bool is_checked = false;
     std::size_t kept = 0;
     ToolWatcher watcher(report());

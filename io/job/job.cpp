@@ -175,8 +175,13 @@ std::optional<fs::path> belowData(const fs::path& file) {
 
 JobInput inputOf(const fs::path& file) {
   const std::optional<fs::path> data = belowData(file);
+  const std::optional<fs::path> here = below(fs::current_path(), file);
   const FileDigest digest = digestOfFile(file);
-  return {(data ? *data : file).string(), data.has_value(), digest.bytes, digest.sha256};
+  return {(data   ? *data
+           : here ? *here
+                  : file)
+              .string(),
+          data.has_value(), digest.bytes, digest.sha256};
 }
 
 }  // namespace
