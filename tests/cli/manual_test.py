@@ -12,6 +12,9 @@ def operators():
     return sorted(link.name for link in (PROGRAM.parent / "operators").iterdir())
 
 
+TOOLS = ("merge", "piece", "plan", "preview", "printers", "ssim", "verify")
+
+
 class Manual(ProgramTest):
     def test_the_overview_fits_a_screen(self):
         lines = self.succeed("--help").decode().splitlines()
@@ -20,7 +23,7 @@ class Manual(ProgramTest):
 
     def test_help_all_has_a_line_for_every_verb(self):
         said = self.succeed("help", "all").decode()
-        for name in [*operators(), "preview", "printers", "ssim", "verify"]:
+        for name in [*operators(), *TOOLS]:
             self.assertRegex(said, rf"(?m)^{name} +\S")
 
     def test_the_committed_pages_are_those_of_the_program(self):
@@ -42,7 +45,7 @@ class Manual(ProgramTest):
     def test_every_verb_has_a_manual_page_that_man_accepts(self):
         self.succeed("docs", "man", "man")
         self.assertEqual(sorted(path.name for path in (self.folder / "man").iterdir()),
-                         sorted([f"vdbdither-{name}.1" for name in [*operators(), "preview", "printers", "ssim", "verify"]] + ["vdbdither.1"]))
+                         sorted([f"vdbdither-{name}.1" for name in [*operators(), *TOOLS]] + ["vdbdither.1"]))
         if not shutil.which("groff"):
             self.skipTest("groff is not installed")
         for page in (self.folder / "man").iterdir():

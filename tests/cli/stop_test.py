@@ -10,8 +10,8 @@ import unittest
 import meshes
 from program import MIMAKI, PATIENCE, PROGRAM, ROOT, ProgramTest, start_program
 
-# Printer profiles are read at once.
-INSTANT = {"printers"}
+# Printer profiles are read at once, and a chain is planned at once on parts as small as these.
+INSTANT = {"plan", "printers"}
 
 # Half a second is promised; the rest is for a busy machine.
 BOUND_SECONDS = 2 * PATIENCE
@@ -32,6 +32,7 @@ def sink(verb, *arguments, input="solid"):
 RUNS = {
     "compare": lambda radius: ("compare", f"solid{radius}.vdb", f"solid{radius}.vdb"),
     "compensate": lambda radius: ("compensate", "-i", f"surface{radius}.vdb", "-o", "out.vdb"),
+    "copies": lambda radius: (*surface(radius), "!", "copies", "--columns", 4, "--rows", 4, "-o", "out.vdb"),
     "csg": lambda radius: ("csg", "-i", f"surface{radius}.vdb", "--union", f"surface{radius}.vdb", "-o", "out.vdb"),
     "dither": lambda radius: ("dither", "-i", f"surface{radius}.vdb", "-o", "out.vdb"),
     "halftone": lambda radius: ("halftone", "-i", f"coloured{radius}.vdb", "-o", "out.vdb"),
@@ -42,10 +43,12 @@ RUNS = {
     "mask-spectrum": lambda radius: ("mask", "--size", 32, "--kind", "white", "!", "mask-spectrum", "out.json", "--step", 48 / radius),
     "material-assign": lambda radius: ("material-assign", "-i", f"solid{radius}.vdb", "-o", "out.vdb"),
     "measure": sink("measure", "--reference", "part8.stl", "--report", "out.json"),
+    "merge": lambda radius: ("merge", f"job{radius}"),
     "mesh-export": sink("mesh-export", "out.ply"),
     "mesh2sdf": lambda radius: (*surface(radius), "--slab", "8", "!", "write", "out.vdb"),
     "normals": lambda radius: ("normals", "-i", f"surface{radius}.vdb", "-o", "out.vdb"),
     "offset": lambda radius: (*surface(radius), "--band", "0.2mm", "!", "offset", "--by", "0.05mm", "-o", "out.vdb"),
+    "piece": lambda radius: ("piece", f"outjob{radius}", "0"),
     "preview": lambda radius: ("preview", f"stack{radius}", "out.html"),
     "read": lambda radius: ("read", f"surface{radius}.vdb", "-o", "out.vdb"),
     "refine": lambda radius: (*surface(radius), "!", "dither", "!", "refine", "-o", "out.vdb"),
@@ -60,6 +63,11 @@ RUNS = {
     "verify": lambda radius: ("verify", f"stack{radius}", "--against", f"solid{radius}.vdb"),
     "write": lambda radius: ("write", "-i", f"surface{radius}.vdb", "out.vdb"),
 }
+
+
+SOURCES = {"mask", "mesh2sdf", "read", "resample", "slice-import"}
+FILTERS = {"compensate", "copies", "csg", "dither", "halftone", "hollow", "interlace", "material-assign", "normals", "offset", "refine", "separate",
+           "simulate"}
 
 
 class Stopped(ProgramTest):
@@ -95,6 +103,11 @@ class Stopped(ProgramTest):
         elif kind == "stack":
             self.make(f"solid{radius}.vdb")
             self.succeed("slice-export", "-i", f"solid{radius}.vdb", name)
+        elif kind in ("outjob", "job"):
+            self.make(f"part{radius}.stl")
+            self.succeed("plan", f"mesh2sdf part{radius}.stl {' '.join(MIMAKI)} ! dither ! slice-export out{radius}", name, "--pieces", "1")
+            if kind == "job":
+                self.succeed("piece", name, "0")
         elif kind == "picture":
             self.succeed("render", "part8.stl", name, "--samples", 1, "--pixel", f"{0.16 / radius}mm")
 
@@ -106,11 +119,11 @@ class Stopped(ProgramTest):
         for radius in self.RADII:
             arguments = tuple(map(str, RUNS[verb](radius)))
             for name in (f"{kind}{radius}{ending}" for kind, ending in (
-                    ("part", ".stl"), ("surface", ".vdb"), ("solid", ".vdb"), ("coloured", ".vdb"), ("stack", ""), ("picture", ".png"))):
+                    ("part", ".stl"), ("surface", ".vdb"), ("solid", ".vdb"), ("coloured", ".vdb"), ("stack", ""), ("picture", ".png"), ("outjob", ""), ("job", ""))):
                 if name in arguments:
                     self.make(name)
             before = self.listing()
-            one_thread = () if verb in ("preview", "ssim") else ("--threads", 1)
+            one_thread = () if verb == "ssim" else ("--threads", 1)
             process = start_program(self, *arguments, *one_thread)
             time.sleep(seconds)
             process.send_signal(number)
@@ -129,7 +142,7 @@ class Stopped(ProgramTest):
         self.fail(f"{verb} ends before it can be stopped; give it a larger part")
 
     def stop_all(self, verbs):
-        for verb in verbs:
+        for verb in sorted(verbs):
             for number, seconds in MOMENTS:
                 with self.subTest(verb=verb, seconds=seconds):
                     self.remove_outputs()
@@ -140,13 +153,13 @@ class Stopped(ProgramTest):
         self.assertEqual(set(RUNS), pages - INSTANT)
 
     def test_sources_can_be_stopped(self):
-        self.stop_all(("mask", "mesh2sdf", "read", "resample", "slice-import"))
+        self.stop_all(SOURCES)
 
     def test_filters_can_be_stopped(self):
-        self.stop_all(("compensate", "csg", "dither", "halftone", "hollow", "interlace", "material-assign", "normals", "offset", "refine", "separate", "simulate"))
+        self.stop_all(FILTERS)
 
     def test_sinks_and_tools_can_be_stopped(self):
-        self.stop_all(("compare", "info", "mask-spectrum", "measure", "mesh-export", "preview", "render", "slice-export", "ssim", "stats", "write"))
+        self.stop_all(RUNS.keys() - SOURCES - FILTERS)
 
 
 class Signals(ProgramTest):

@@ -31,6 +31,7 @@ namespace cost {
 // Microseconds for each leaf.
 inline constexpr double compare_us_per_grid = 3;
 inline constexpr double compensate_us = 200;
+inline constexpr double copies_us = 0.6;  ///< for each grid and copy
 inline constexpr double csg_us = 14;
 inline constexpr double diffusion_us = 20;
 inline constexpr double dither_us = 6;
