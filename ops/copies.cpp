@@ -15,7 +15,6 @@ namespace vdbdither {
 namespace {
 
 using openvdb::Coord;
-using openvdb::CoordBBox;
 
 /// Copies of the part beside each other, in columns along x and rows along y. Leaves are copied
 /// whole, so the distance from copy to copy is a multiple of their edge.

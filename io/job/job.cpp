@@ -167,7 +167,7 @@ std::optional<fs::path> below(const fs::path& folder, const fs::path& file) {
 
 std::optional<fs::path> belowData(const fs::path& file) {
   for (const fs::path& folder : dataFolders()) {
-    const auto path = below(folder, file);
+    auto path = below(folder, file);
     if (path && findDataFile(path->string())) return path;
   }
   return std::nullopt;
