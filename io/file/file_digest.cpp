@@ -19,7 +19,7 @@ FileDigest digestOfFile(const std::filesystem::path& path) {
   errno = 0;
   std::ifstream file(path, std::ios::binary);
   if (!file) throw failed();
-  constexpr std::size_t piece_bytes = std::size_t{1} << 20;
+  constexpr std::size_t piece_bytes = std::size_t{1} << 16;
   std::vector<char> piece(piece_bytes);
   Digest digest;
   FileDigest result;

@@ -94,7 +94,6 @@ std::string sbatch(const Job& job) {
 
 std::string openJobDescription(const Job& job) {
   constexpr int chunk_seconds = 600;
-  constexpr std::size_t most_in_chunk = 150;
   const Needs needs = needsOf(job);
   const std::size_t last = job.pieces.size() - 1;
   const auto step = [&](const char* name, ordered_json parameters, ordered_json words) {
@@ -107,17 +106,12 @@ std::string openJobDescription(const Job& job) {
         {"actions", {{"onRun", {{"command", "vdbdither"}, {"args", std::move(words)}}}}}};
     return json;
   };
-  std::size_t chunk = 1;
-  if (const auto seconds = job.pieces.front().seconds; seconds && *seconds > 0) {
-    chunk = std::clamp<std::size_t>(static_cast<std::size_t>(chunk_seconds / *seconds), 1,
-                                    most_in_chunk);
-  }
   const ordered_json pieces{
       {"taskParameterDefinitions", ordered_json::array({{{"name", "Piece"},
                                                          {"type", "CHUNK[INT]"},
                                                          {"range", "0-" + std::to_string(last)},
                                                          {"chunks",
-                                                          {{"defaultTaskCount", chunk},
+                                                          {{"defaultTaskCount", 1},
                                                            {"targetRuntimeSeconds", chunk_seconds},
                                                            {"rangeConstraint", "CONTIGUOUS"}}}}})}};
   ordered_json merge =
