@@ -206,9 +206,11 @@ class Plan : public Tool {
     for (const JobPlan& plan : plans) {
       JobPiece piece{{plan.layers.begin - whole.layers.begin, plan.layers.end - whole.layers.begin},
                      plan.seconds,
-                     plan.memory_bytes,
+                     std::ceil(plan.memory_bytes),
                      0};
-      for (const StagePlan& stage : plan.stages) piece.disk_bytes += stage.output.bytes;
+      // Estimates are about so much.
+      if (piece.seconds) piece.seconds = std::ceil(10 * *piece.seconds) / 10;
+      for (const StagePlan& stage : plan.stages) piece.disk_bytes += std::ceil(stage.output.bytes);
       job.pieces.push_back(piece);
     }
     job.slab_layers = plans.front().slab_layers;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -50,16 +50,11 @@ ordered_json jsonOf(const std::vector<JobInput>& inputs) {
   return json;
 }
 
-/// Figures of estimates are rounded, for they are about so much.
-double rounded(double value) { return std::ceil(value * 10) / 10; }
-
 /// Reads the members of a job.
 class JobParser {
  public:
-  explicit JobParser(const fs::path& file) : shown_("'" + file.string() + "'") {
-    constexpr std::uint64_t most_bytes = std::uint64_t{64} << 20;
-    const std::vector<std::uint8_t> bytes = readWholeFile(file, shown_, most_bytes);
-    json_ = parsedJson({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  JobParser(std::string_view text, std::string shown)
+      : shown_(std::move(shown)), json_(parsedJson(text)) {
     if (!json_.is_object()) refuse("it is not a JSON object");
   }
 
@@ -202,12 +197,14 @@ std::string textOf(const Job& job) {
     json["pieces"].push_back(
         {{"number", number},
          {"layers", {piece.layers.begin, piece.layers.end}},
-         {"seconds", piece.seconds ? ordered_json(rounded(*piece.seconds)) : ordered_json()},
-         {"memory_bytes", std::ceil(piece.memory_bytes)},
-         {"disk_bytes", std::ceil(piece.disk_bytes)}});
+         {"seconds", piece.seconds ? ordered_json(*piece.seconds) : ordered_json()},
+         {"memory_bytes", piece.memory_bytes},
+         {"disk_bytes", piece.disk_bytes}});
   }
   return jsonText(json, 1) + "\n";
 }
+
+Job jobOf(std::string_view text, const std::string& shown) { return JobParser(text, shown).job(); }
 
 Job readJob(const fs::path& folder) {
   std::error_code none;
@@ -215,7 +212,10 @@ Job readJob(const fs::path& folder) {
     throw DataError("'" + folder.string() + "' holds no " + job_name +
                     ", so it is not a job made by plan");
   }
-  return JobParser(folder / job_name).job();
+  constexpr std::uint64_t most_bytes = std::uint64_t{64} << 20;
+  const std::string shown = "'" + (folder / job_name).string() + "'";
+  const std::vector<std::uint8_t> bytes = readWholeFile(folder / job_name, shown, most_bytes);
+  return jobOf({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, shown);
 }
 
 std::string identityOf(const Job& job) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "vdbdither/model/lattice.h"
@@ -47,8 +48,12 @@ struct Job {
 /// The text of `job.json`.
 std::string textOf(const Job& job);
 
-/// Reads the job that a folder holds. Throws DataError where it is missing or malformed, or was
-/// planned by another version of the program.
+/// Reads that text back. Throws DataError where it is malformed, or was planned by another version
+/// of the program.
+/// @param shown  what messages call it: its name in quotes
+Job jobOf(std::string_view text, const std::string& shown);
+
+/// Reads the job that a folder holds. Throws DataError as `jobOf` does, and where there is none.
 Job readJob(const std::filesystem::path& folder);
 
 /// A digest of what the bytes of a piece follow from, besides its layers: version, chain, lattice

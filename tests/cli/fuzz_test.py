@@ -146,6 +146,11 @@ class Fuzzers(ProgramTest):
                           "a --text $'w\\x41' --coord 1,2,3 --triple 1"}
         for name, text in texts.items():
             (self.seeds / name).write_text(text)
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.3, 8))
+        self.succeed("plan", "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! slice-export out", "--pieces", "2")
+        self.succeed("piece", "job", "1")
+        (self.seeds / "job").write_bytes(b"j" + (self.folder / "job/job.json").read_bytes())
+        (self.seeds / "piece").write_bytes(b"s" + next((self.folder / "job").rglob("piece.bin")).read_bytes())
         self.fuzz("text_fuzz", WORDS)
 
 

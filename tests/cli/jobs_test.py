@@ -153,6 +153,13 @@ class Jobs(ProgramTest):
         self.succeed("piece", "job", "1")
         self.assertEqual([path.name for path in (self.folder / "job/pieces").iterdir()], ["0001"])
 
+    def test_two_runs_may_make_the_same_piece_at_once(self):
+        self.plan(f"{DITHER} ! slice-export out")
+        runs = [self.start("piece", "job", "0-3") for _ in range(3)]
+        self.assertEqual([(run.wait(), run.stderr.read()) for run in runs], [(0, b"")] * 3)
+        self.succeed("merge", "job")
+        self.assertEqual(sorted(path.name for path in (self.folder / "job/pieces").iterdir()), ["0000", "0001", "0002", "0003"])
+
     def test_inputs_must_be_the_files_that_were_planned(self):
         (self.folder / "own.json").write_text((pathlib.Path(__file__).parents[2] / "samples/printers/mimaki-3duj-553.json").read_text())
         job = self.plan(f"mesh2sdf part.stl --printer own.json ! dither ! slice-export out")

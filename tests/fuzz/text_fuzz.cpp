@@ -1,6 +1,7 @@
 // Feeds the readers of texts with whatever a fuzzer can think of: they return what they write again
 // alike, or refuse. The first letter of a unit chooses the reader.
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -14,10 +15,13 @@
 
 #include "io/file/key_values.h"
 #include "io/file/xml_reader.h"
+#include "io/job/job.h"
 #include "io/profile/json_lines.h"
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
 #include "io/profile/profile_parser.h"
+#include "io/stack/stack_piece.h"
+#include "io/stack/stack_preview.h"
 #include "tests/fuzz/require.h"
 #include "vdbdither/engine/chain.h"
 #include "vdbdither/engine/json_text.h"
@@ -138,6 +142,18 @@ void readChain(const std::string& line) {
   }
 }
 
+void readJobText(const std::string& text) {
+  const std::string written = textOf(jobOf(text, "'a'"));
+  require(textOf(jobOf(written, "'a'")) == written);
+}
+
+void readStackPiece(std::span<const std::uint8_t> bytes) {
+  const std::vector<std::uint8_t> written = bytesOf(stackPieceOf(bytes));
+  require(std::equal(written.begin(), written.end(), bytes.begin(), bytes.end()));
+  StackPreview preview({0.1, 0.1, 0.1}, 8, 8, {0, 8}, {0, 1, 2});
+  preview.addPart(stackPieceOf(bytes).preview);
+}
+
 void readText(std::span<const std::uint8_t> unit) {
   const auto bytes = unit.subspan(1);
   const std::string text(bytes.begin(), bytes.end());
@@ -152,6 +168,10 @@ void readText(std::span<const std::uint8_t> unit) {
       return readXml(bytes);
     case 'c':
       return readChain(text);
+    case 'j':
+      return readJobText(text);
+    case 's':
+      return readStackPiece(bytes);
     default:
       return;
   }
