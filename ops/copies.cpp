@@ -63,7 +63,7 @@ class Copies : public Filter {
 
   [[nodiscard]] std::vector<Read> reads() const override {
     std::vector<Read> reads;
-    for (const std::string& name : names_) reads.push_back({name, Reach::point()});
+    for (const std::string& name : names_) reads.push_back({name, Reach::point(), true});
     return reads;
   }
 

@@ -71,6 +71,15 @@ class Chain(ProgramTest):
     def test_fused_piped_and_filed_runs_of_any_slab_and_threads_agree_on_stratasys(self):
         self.assert_every_way_gives_the_same_on("stratasys-j750-27um")
 
+    def test_copies_are_made_of_grids_that_a_later_stage_reads(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.5))
+        chain = ("mesh2sdf", "part.stl", "--printer", "mimaki-3duj-553", "!", "dither", "!", "copies", "--rows", 2, "!")
+        for end, expected in ((("slice-export", "out"), {"solid"}), (("write", "out.vdb"), {"solid", "surface"})):
+            plan = json.loads(self.succeed(*chain, *end, "--explain", "--json"))
+            self.assertEqual({read["grid"] for read in plan["stages"][2]["reads"]}, expected)
+        self.succeed(*chain, "write", "out.vdb", "!", "slice-export", "out")
+        self.succeed("verify", "out", "--against", "out.vdb")
+
     def test_a_layer_range_gives_exactly_those_slices(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(1.2))
         stages = " ! ".join(self.chain("mimaki-3duj-553", "part.stl"))

@@ -32,6 +32,7 @@ JobPlan chain(const Reach& reach) {
   plan.stages[0].handed_on = {"a", "b"};
   plan.stages[1].reads = {{"a", reach}};
   plan.stages[1].handed_on = {"b"};
+  plan.stages[2].cores = {0, 64};
   return plan;
 }
 
@@ -79,6 +80,15 @@ TEST(MemoryBytes, ABarrierHoldsTheWholeVolumeAndNoMoreLeavesThanThereAre) {
   plan.stages[2].is_barrier = true;
   // 64 layers meet up to 9 rows of 10 leaves, but there are 80.
   EXPECT_NEAR(memoryBytes(plan, 8) - before, (80 - 20) * leaf(), 1);
+}
+
+TEST(MemoryBytes, OfASinkAreThoseOfTheLayersThatItTakes) {
+  JobPlan plan = chain(Reach::point());
+  plan.stages[2].is_barrier = true;
+  const double all = memoryBytes(plan, 8);
+  plan.stages[2].cores = {16, 32};
+  // 16 layers meet up to 3 rows of 10 leaves.
+  EXPECT_NEAR(all - memoryBytes(plan, 8), (80 - 30) * leaf(), 1);
 }
 
 TEST(Seconds, AreTheSumOfAllStagesOnSomeThreads) {

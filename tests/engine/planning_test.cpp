@@ -60,6 +60,18 @@ TEST(Planning, AStageHandsOnWhatALaterOneReads) {
   EXPECT_THAT(archived.stages[1].handed_on, ElementsAre("n", "seen"));
 }
 
+TEST(Planning, APieceIsPlannedAsARunOfItsLayers) {
+  const std::string chain = "numbers --top 200 ! sum --below 3 --above 20 ! keep --memory 4GiB";
+  RunOptions options;
+  options.memory = "4GiB";
+  const JobPlan piece = planPiece(planOf(chain), {80, 90}, options);
+  const JobPlan run = planOf(chain + " --layers 80:90");
+  EXPECT_EQ(toJson(piece), toJson(run));
+  EXPECT_NE(toJson(piece), toJson(planOf(chain)));
+  EXPECT_EQ(piece.stages[1].window, run.stages[1].window);
+  EXPECT_LT(piece.memory_bytes, planOf(chain + " --slab all").memory_bytes);
+}
+
 TEST(Planning, InputsAreDeclaredAndTheirMemoryCounts) {
   const JobPlan plan = planOf("numbers ! join --top 40 --pipe ! keep");
   ASSERT_EQ(plan.stages[1].inputs.size(), 1U);

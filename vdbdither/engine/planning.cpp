@@ -46,6 +46,8 @@ void planGrids(JobPlan& plan) {
   GridNames needed;
   for (auto stage = plan.stages.rbegin(); stage != plan.stages.rend(); ++stage) {
     stage->handed_on = needed;
+    std::erase_if(stage->reads,
+                  [&](const Read& read) { return read.if_wanted && !needed.contains(read.grid); });
     for (const Read& read : stage->reads) needed.insert(read.grid);
   }
 }

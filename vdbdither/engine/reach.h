@@ -23,6 +23,9 @@ struct Reach {
 struct Read {
   std::string grid;
   Reach reach;
+  /// Whether a filter makes nothing of it but the same grid anew, so that it is read only where a
+  /// later stage reads that one.
+  bool if_wanted = false;
 };
 
 /// The widest of the reaches.
