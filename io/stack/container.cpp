@@ -100,14 +100,15 @@ Picture thumbnailOf(const SpanImage& image, std::uint32_t width, std::uint32_t h
   // Sums of linear light, each pixel of the image in one pixel of the thumbnail.
   std::vector<std::array<double, 4>> sums(std::size_t{inner_width} * inner_height);
   for (std::uint32_t y = 0; y < image.height; ++y) {
-    const std::uint32_t row = std::uint64_t{y} * inner_height / image.height;
+    const auto row = static_cast<std::uint32_t>(std::uint64_t{y} * inner_height / image.height);
     std::uint32_t x = 0;
     for (const Span& span : image.row(y)) {
       std::array<double, 3> light{};
       for (int channel = 0; channel < 3; ++channel)
         light[channel] = linearOfSrgbBytes()[span.value >> 8 * channel & 255];
       for (; x < span.end; ++x) {
-        const std::uint32_t column = std::uint64_t{x} * inner_width / image.width;
+        const auto column =
+            static_cast<std::uint32_t>(std::uint64_t{x} * inner_width / image.width);
         std::array<double, 4>& sum = sums[std::size_t{row} * inner_width + column];
         for (int channel = 0; channel < 3; ++channel) sum[channel] += light[channel];
         sum[3] += 1;

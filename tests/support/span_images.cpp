@@ -28,7 +28,7 @@ SpanImage ditheredDisc(int width, int height, double rim, std::uint32_t seed) {
     const double u = (x + 0.5) / width * 2 - 1;
     const double v = (y + 0.5) / height * 2 - 1;
     const double depth = (1 - std::hypot(u, v)) * width / 2;
-    return depth > 0 && depth / rim > random() / 4294967296.0 ? 1U : 0U;
+    return depth > 0 && depth / rim > static_cast<double>(random()) / 4294967296.0 ? 1U : 0U;
   });
 }
 

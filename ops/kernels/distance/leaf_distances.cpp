@@ -16,6 +16,7 @@
 
 #include "ops/kernels/distance/row_crossings.h"
 #include "ops/kernels/leaf/tie.h"
+#include "vdbdither/model/instruction_set.h"
 
 namespace vdbdither {
 
@@ -435,7 +436,7 @@ const LeafKernels& portableLeafKernels() {
 const LeafKernels& leafKernels() {
 #if defined(__x86_64__)
   static const LeafKernels avx2{&lowerAvx2, &raiseAvx2, &finishAvx2};
-  if (__builtin_cpu_supports("avx2")) return avx2;
+  if (bestInstructionSet() == InstructionSet::avx2) return avx2;
 #endif
   return portableLeafKernels();
 }

@@ -141,7 +141,7 @@ struct LeafKernels {
                      float tie_mm, float limit_mm, float background_mm, float* values);
 };
 
-/// Returns the kernels for this processor.
+/// Returns the kernels for the best instruction set.
 const LeafKernels& leafKernels();
 
 /// Returns the kernels for any processor, for comparison.

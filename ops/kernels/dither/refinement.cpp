@@ -75,9 +75,9 @@ class RefinedBlock {
         numbers_[indexOf(at)] = static_cast<std::int16_t>(voxels_.size());
         voxels_.push_back(
             {at, bitAt(leaf->free, offset), bitAt(leaf->printed, offset), open.error});
-        places_.x.push_back(static_cast<float>(at.x() * step_.x()));
-        places_.y.push_back(static_cast<float>(at.y() * step_.y()));
-        places_.z.push_back(static_cast<float>(at.z() * step_.z()));
+        places_.x.push_back(static_cast<float>(at.x()) * step_.x());
+        places_.y.push_back(static_cast<float>(at.y()) * step_.y());
+        places_.z.push_back(static_cast<float>(at.z()) * step_.z());
         places_.depth.push_back(open.depth);
         places_.sum.push_back(around_.sum(ijk, open.depth));
       });

@@ -184,7 +184,7 @@ void SliceSpectra::addVoxelPlane(const Vec3d& normal, std::vector<double>& sums,
   for (const Frequency& frequency : frequencies_) {
     const double sine = std::sin(pi * frequency.cycles[w_axis]) / pi;
     for (int copy = -copies; copy <= copies; ++copy) {
-      const double w = frequency.cycles[w_axis] + copy;
+      const double w = frequency.cycles[w_axis] + static_cast<float>(copy);
       const double weight = w == 0 ? 1 : sine * sine / (w * w);
       if (weight < 1e-6) continue;
       const float u = wrapped(frequency.cycles[u_axis] + static_cast<float>(w * s));

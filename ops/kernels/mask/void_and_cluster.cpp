@@ -479,13 +479,6 @@ std::uint64_t nextRandom(std::uint64_t& state) { return scattered(state += split
 
 }  // namespace
 
-InstructionSet bestInstructionSet() {
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return InstructionSet::avx2;
-#endif
-  return InstructionSet::baseline;
-}
-
 std::vector<std::uint32_t> randomPermutation(std::uint32_t count, std::uint64_t seed) {
   std::vector<std::uint32_t> permutation(count);
   std::iota(permutation.begin(), permutation.end(), 0u);

@@ -7,14 +7,9 @@
 #include <openvdb/Types.h>
 
 #include "ops/kernels/mask/mask_kernel.h"
+#include "vdbdither/model/instruction_set.h"
 
 namespace vdbdither {
-
-/// The instruction set of the code that adds and scans energies. All give the same ranks.
-enum class InstructionSet { baseline, avx2 };
-
-/// Returns the best instruction set of this processor.
-InstructionSet bestInstructionSet();
 
 /// The settings of a void-and-cluster mask.
 struct VoidAndCluster {
@@ -53,6 +48,7 @@ double voidAndClusterSeconds(const VoidAndCluster& settings);
 /// the place where the voxel is stored.
 ///
 /// `progress` is called from time to time with the fraction done, 0 … 1; it may throw to stop.
+/// `instructions` are those of the code that adds and scans energies.
 std::vector<std::uint32_t> voidAndCluster(const VoidAndCluster& settings,
                                           const std::function<void(double fraction)>& progress = {},
                                           InstructionSet instructions = bestInstructionSet());

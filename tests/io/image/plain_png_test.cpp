@@ -101,7 +101,7 @@ Bytes rowsOf(int width, int height, const Kind& kind, bool is_filtered, std::mt1
   const std::size_t unit = kind.kind == 6 ? 4 : 1;
   Bytes rows;
   for (int y = 0; y < height; ++y) {
-    rows.push_back(is_filtered && random() % 3 ? random() % 5 : 0);
+    rows.push_back(static_cast<std::uint8_t>(is_filtered && random() % 3 ? random() % 5 : 0));
     std::array<std::uint8_t, 4> value{};
     std::size_t left = 0;
     for (std::size_t i = 0; i < size; ++i) {

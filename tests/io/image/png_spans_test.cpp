@@ -152,7 +152,7 @@ TEST(PngSpans, BitsAcrossByteBorders) {
   std::mt19937 random(6);
   for (int round = 0; round < 200; ++round) {
     const int width = 1 + static_cast<int>(random() % 90);
-    const std::uint32_t sparse = 1 + random() % 12;
+    const auto sparse = static_cast<std::uint32_t>(1 + random() % 12);
     const SpanImage image =
         spanImage(width, 4, [&](int, int) { return random() % sparse == 0 ? 1U : 0U; });
     expectDecodes(image, {PngPixels::grey1, {}, 0, 0});

@@ -134,9 +134,11 @@ TEST(TextureTiff, ReadsGreyAndColoursOfEightAndSixteenBits) {
 
 TEST(TextureTiff, ReadsTilesStripsPlanesAndPackings) {
   const Samples samples = pattern(37, 29, 4, 16);
-  for (const std::uint16_t packing :
-       {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE, COMPRESSION_PACKBITS}) {
-    for (const std::uint16_t planes : {PLANARCONFIG_CONTIG, PLANARCONFIG_SEPARATE}) {
+  constexpr std::uint16_t packings[] = {COMPRESSION_NONE, COMPRESSION_LZW,
+                                        COMPRESSION_ADOBE_DEFLATE, COMPRESSION_PACKBITS};
+  constexpr std::uint16_t layouts[] = {PLANARCONFIG_CONTIG, PLANARCONFIG_SEPARATE};
+  for (const std::uint16_t packing : packings) {
+    for (const std::uint16_t planes : layouts) {
       for (const std::uint32_t tile : {0, 16}) {
         for (const std::uint32_t rows : {1, 8, 29}) {
           expectTexels(decoded(tiffOf(samples, {.packing = packing,

@@ -37,7 +37,7 @@ void expectCover(const std::vector<Vec3d>& points, const std::vector<std::uint32
 TEST(Polygon, TriangulatesConcavePolygonsWithoutTurningATriangleOver) {
   std::mt19937 random(11);
   for (int round = 0; round < 300; ++round) {
-    const std::uint32_t corners = 4 + random() % 60;
+    const auto corners = static_cast<std::uint32_t>(4 + random() % 60);
     std::vector<Vec3d> points;
     std::vector<std::uint32_t> polygon;
     for (std::uint32_t i = 0; i < corners; ++i) {
@@ -53,7 +53,7 @@ TEST(Polygon, TriangulatesConcavePolygonsWithoutTurningATriangleOver) {
 TEST(Polygon, TriangulatesAroundAHoleJoinedByASlit) {
   std::mt19937 random(13);
   for (int round = 0; round < 300; ++round) {
-    const std::uint32_t corners = 3 + random() % 20;
+    const auto corners = static_cast<std::uint32_t>(3 + random() % 20);
     std::vector<Vec3d> points;
     std::vector<std::uint32_t> polygon;
     for (std::uint32_t i = 0; i < corners; ++i) {

@@ -43,7 +43,8 @@ TEST(Stl, WeldsManyVerticesLikeAMap) {
   std::mt19937 random(3);
   Mesh soup;
   for (std::uint32_t i = 0; i < 30000; ++i) {
-    soup.vertices.emplace_back(random() % 20, random() % 20, random() % 20 * 0.25);
+    soup.vertices.emplace_back(random() % 20, random() % 20,
+                               static_cast<double>(random() % 20) * 0.25);
     if (i % 3 == 2) soup.triangles.push_back({i - 2, i - 1, i});
   }
   const Mesh mesh = parseQuietly(binaryStl(soup));

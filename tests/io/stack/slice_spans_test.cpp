@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/span_images.h"
+
 namespace vdbdither {
 namespace {
 
@@ -110,6 +112,28 @@ TEST(SliceSpans, OfASetShowWhatIsActiveAndTrue) {
     grid->tree().setValueOnly(at, on);
   }
   expectShowsEveryVoxel(*grid, CoordBBox(Coord(0, 0, 0), Coord(63, 15, 15)), {0, 16});
+}
+
+TEST(SliceSpans, ExpandABoxByWhatIsPrintedAndNoFurther) {
+  std::mt19937 random(3);
+  for (int round = 0; round < 100; ++round) {
+    const int width = 1 + static_cast<int>(random() % 9);
+    const auto sparse = static_cast<std::uint32_t>(1 + random() % 20);
+    const SpanImage image =
+        test::spanImage(width, 5, [&](int, int) { return random() % sparse == 0 ? 2U : 0U; });
+    CoordBBox expected;
+    for (std::uint32_t y = 0; y < image.height; ++y) {
+      std::uint32_t x = 0;
+      for (const Span& span : image.row(y)) {
+        for (; x < span.end; ++x) {
+          if (span.value != 0) expected.expand({static_cast<int>(x), static_cast<int>(y), 7});
+        }
+      }
+    }
+    CoordBBox box;
+    expandByPrinted(box, image, 7);
+    EXPECT_EQ(box, expected);
+  }
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <random>
@@ -10,6 +11,7 @@
 
 #include "ops/kernels/leaf/tie.h"
 #include "ops/kernels/mesh/closest_point.h"
+#include "vdbdither/model/instruction_set.h"
 
 namespace vdbdither {
 namespace {
@@ -158,6 +160,14 @@ TEST(LeafDistances, WhatIsLookedAtDoesNotChangeABit) {
     leafKernels().lower(part, 0, false, less);
     for (const Coord& ijk : part.reach) ASSERT_EQ(distanceAt(whole, ijk), distanceAt(less, ijk));
   }
+}
+
+TEST(LeafDistances, TheBaselineIsTheCodeForAnyProcessor) {
+  ASSERT_EQ(setenv("VDBDITHER_INSTRUCTIONS", "baseline", 1), 0);
+  EXPECT_EQ(&leafKernels(), &portableLeafKernels());
+  ASSERT_EQ(unsetenv("VDBDITHER_INSTRUCTIONS"), 0);
+  EXPECT_EQ(&leafKernels() == &portableLeafKernels(),
+            bestInstructionSet() == InstructionSet::baseline);
 }
 
 TEST(LeafDistances, EveryInstructionSetGivesTheSameBits) {
