@@ -304,7 +304,10 @@ TreeLayout layoutOf() {
 template <typename... Grids>
 std::optional<TreeLayout> layoutAmong(const std::string& type, openvdb::TypeList<Grids...>) {
   std::optional<TreeLayout> layout;
-  ((type == Grids::gridType() ? (layout = layoutOf<Grids>(), true) : false) || ...);
+  const auto take = [&]<typename GridT>(const GridT*) {
+    if (type == GridT::gridType()) layout = layoutOf<GridT>();
+  };
+  (take(static_cast<const Grids*>(nullptr)), ...);
   return layout;
 }
 
