@@ -59,6 +59,10 @@ class StagedOutput {
   /// kept under its name with `.new`. Throws Interrupted if the run is to stop.
   void commit();
 
+  /// Does not wait for the disk in `commit` from now on: a machine that stops may lose outputs that
+  /// have their names.
+  static void leaveFlushOut();
+
   /// Removes all outputs of the process that are not committed, and lets none be committed or
   /// written to any more: threads that try stay where they are. For a process that ends without
   /// its destructors.

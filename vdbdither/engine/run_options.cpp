@@ -34,6 +34,9 @@ void RunOptions::declare(Options& options) {
                "Writes this file instead of standard output, where the chain has no sink");
   options.letter('o');
   options.flag("overwrite", overwrite, "Replaces the output if it exists");
+  options.flag("no-flush", no_flush,
+               "Does not wait until outputs are on the disk: faster, but a machine that stops may "
+               "lose outputs of runs that have ended");
   options.integer("threads", threads, {0, 4096}, "Number of threads; 0 takes all");
   options.parsed(
       "slab", "N", [this](const std::string& text) { slab = checkedSlab(text); },
