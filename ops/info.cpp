@@ -125,10 +125,6 @@ Summary summaryOf(const GridBase& grid) {
   if (isCarried(grid)) {
     static_cast<GridSummary&>(summary) = gridSummary(grid);
     summary.fault = faultOf(grid);
-  } else {
-    summary.active_voxels = grid.activeVoxelCount();
-    summary.box = grid.evalActiveVoxelBoundingBox();
-    summary.leaf_bytes = grid.memUsage();
   }
   return summary;
 }
@@ -208,12 +204,12 @@ class Description {
 
   [[nodiscard]] ordered_json gridJson(const std::string& name, const GridBase& grid,
                                       const Summary& summary) const {
-    ordered_json entry = {{"name", name},
-                          {"type", grid.valueType()},
-                          {"class", className(grid)},
-                          {"active_voxels", summary.active_voxels},
-                          {"leaves", summary.leaves},
-                          {"leaf_bytes", summary.leaf_bytes}};
+    ordered_json entry = {{"name", name}, {"type", grid.valueType()}, {"class", className(grid)}};
+    if (isCarried(grid)) {
+      entry["active_voxels"] = summary.active_voxels;
+      entry["leaves"] = summary.leaves;
+      entry["leaf_bytes"] = summary.leaf_bytes;
+    }
     if (isVector(grid)) entry["vector_type"] = GridBase::vecTypeToString(grid.getVectorType());
     if (summary.active_voxels > 0) {
       entry["min"] = triple(summary.box.min());
@@ -244,6 +240,12 @@ class Description {
     if (grid.getGridClass() != openvdb::GRID_UNKNOWN) text << ", " << className(grid);
     if (isVector(grid) && grid.getVectorType() != openvdb::VEC_INVARIANT)
       text << ", " << GridBase::vecTypeToString(grid.getVectorType());
+    if (!isCarried(grid)) {
+      text << ": voxels not read\n";
+      for (const auto& [key, value] : metadataOf(grid, longest_in_text))
+        text << margin << key << ": " << printable(value) << "\n";
+      return;
+    }
     text << ": " << summary.active_voxels << " voxels";
     if (summary.active_voxels > 0) {
       text << " from " << tripleText(summary.box.min()) << " to " << tripleText(summary.box.max());
@@ -255,9 +257,8 @@ class Description {
              << shortText(summary.maximum[0]);
       }
     }
-    text << ", " << bytesText(static_cast<double>(summary.leaf_bytes));
-    if (isCarried(grid)) text << " in " << summary.leaves << " leaves";
-    text << "\n";
+    text << ", " << bytesText(static_cast<double>(summary.leaf_bytes)) << " in " << summary.leaves
+         << " leaves\n";
     if (summary.fault) text << margin << *summary.fault << "\n";
     for (const auto& [key, value] : metadataOf(grid, longest_in_text))
       text << margin << key << ": " << printable(value) << "\n";

@@ -1,6 +1,7 @@
 #include "io/file/staged_output.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <fcntl.h>
@@ -101,6 +102,20 @@ class Written {
     const std::lock_guard lock(mutex_);
     return partials_.contains(keyOf(target));
   }
+  /// Whether the target may take the place of what appears there, as `StagedOutput::check` was told
+  /// last.
+  void setReplacing(const fs::path& target, bool replaces) {
+    const std::lock_guard lock(mutex_);
+    if (replaces) {
+      kept_.erase(keyOf(target));
+    } else {
+      kept_.insert(keyOf(target));
+    }
+  }
+  bool replaces(const fs::path& target) {
+    const std::lock_guard lock(mutex_);
+    return !kept_.contains(keyOf(target));
+  }
   std::vector<fs::path> partials() {
     const std::lock_guard lock(mutex_);
     std::vector<fs::path> paths;
@@ -121,7 +136,10 @@ class Written {
 
   std::mutex mutex_;
   std::map<fs::path, fs::path> partials_;
+  std::set<fs::path> kept_;
 };
+
+std::atomic<bool> flushes = true;
 
 bool isMountPoint(const fs::path& path) {
   struct statx status {};
@@ -191,6 +209,7 @@ void writeBytes(int file, std::span<const std::uint8_t> bytes, const fs::path& s
 /// Waits until what was written to a file, or to the file system of a folder, is on the disk.
 /// Returns 0 or the error. What cannot be flushed, as some file systems cannot, is not waited for.
 int flushed(const fs::path& path, int (*flush)(int)) {
+  if (!flushes) return 0;
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) return errno;
   int error = 0;
@@ -214,6 +233,7 @@ void StagedOutput::check(const fs::path& given, Kind kind, bool overwrite) {
   }
   if (Written::all().contains(target))
     throw UsageError(name + " is written by another step already");
+  Written::all().setReplacing(target, overwrite);
   std::error_code ignored;
   const fs::file_status status = fs::status(target, ignored);
   if (!fs::exists(status)) {
@@ -296,6 +316,8 @@ StagedOutput::~StagedOutput() {
   Written::all().erase(target_);
 }
 
+void StagedOutput::leaveFlushOut() { flushes = false; }
+
 void StagedOutput::abandonAll(std::chrono::milliseconds patience) {
   // Never unlocked. A write to a network disk that does not answer may hold it: then go on without.
   (void)Written::all().naming.try_lock_for(patience);
@@ -350,21 +372,33 @@ void StagedOutput::commit() {
   Written::all().forgetPartial(target_);
   if (kind_ == Kind::folder) {
     commitFolder();
-  } else if (!renamed(partial_, target_)) {
-    fail("write", shown_, errno);
+  } else {
+    commitFile();
   }
   committed_ = true;
   // The name itself. The output is whole with or without it.
   flushed(parentOf(target_), ::fsync);
 }
 
+void StagedOutput::commitFile() {
+  if (!Written::all().replaces(target_)) {
+    if (renamed(partial_, target_, RENAME_NOREPLACE)) return;
+    const int error = errno;
+    if (isThere(target_)) keepBeside(EEXIST);
+    const bool knows_the_flag = error != EINVAL && error != ENOSYS;
+    if (knows_the_flag) fail("write", shown_, error);
+  }
+  if (!renamed(partial_, target_)) fail("write", shown_, errno);
+}
+
 void StagedOutput::commitFolder() {
   std::error_code ignored;
   if (!isThere(target_)) {
-    if (!renamed(partial_, target_)) fail("write", shown_, errno);
-    return;
+    if (renamed(partial_, target_)) return;
+    if (errno != ENOTEMPTY && errno != EEXIST) fail("write", shown_, errno);
   }
   if (!fs::is_directory(target_, ignored)) keepBeside(ENOTDIR);
+  if (!Written::all().replaces(target_) && !fs::is_empty(target_, ignored)) keepBeside(EEXIST);
   if (renamed(partial_, target_, RENAME_EXCHANGE)) {
     committed_ = true;
     retire(partial_);

@@ -23,7 +23,8 @@ class StagedOutput {
   using OwnFiles = std::function<std::set<std::string>(const std::filesystem::path& folder)>;
 
   /// Checks that `target` can be written: its parent exists, and it does not exist itself or may be
-  /// overwritten (an empty folder always may). Throws UsageError.
+  /// overwritten (an empty folder always may). Throws UsageError. Without `overwrite`, what another
+  /// run writes there from now on is not replaced either.
   static void check(const std::filesystem::path& target, Kind kind, bool overwrite);
 
   /// Puts back the folder `target` where a killed run had put it aside, with a warning.
@@ -58,9 +59,13 @@ class StagedOutput {
   /// old one or the new one is there, whole, also if the machine stops. (Where the file system
   /// cannot exchange folders, a run that is killed in this moment leaves the old one for
   /// `putBack`.) Files that somebody else put into the old folder since `checkFolder` stay in the
-  /// folder. Throws DataError; a folder that could not take the place of the old one is then kept
-  /// under its name with `.new`. Throws Interrupted if the run is to stop.
+  /// folder. Throws DataError; an output that could not take the place of what is there is then
+  /// kept under its name with `.new`. Throws Interrupted if the run is to stop.
   void commit();
+
+  /// Does not wait for the disk in `commit` from now on: a machine that stops may lose outputs that
+  /// have their names.
+  static void leaveFlushOut();
 
   /// Removes all outputs of the process that are not committed, and lets none be committed or
   /// written to any more: threads that try stay where they are. For a process that ends without
@@ -73,6 +78,7 @@ class StagedOutput {
   [[nodiscard]] std::filesystem::path placeOf(const std::string& name) const;
   void begin();
   void removeLeftovers() const;
+  void commitFile();
   void commitFolder();
   [[noreturn]] void keepBeside(int error);
   void retire(const std::filesystem::path& old) const;

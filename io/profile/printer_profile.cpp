@@ -156,9 +156,14 @@ openvdb::Vec3d pointSpreadMmOf(const Schema& schema) {
 
 std::vector<std::string> installedPrinters() {
   std::vector<std::string> names;
-  for (const std::filesystem::path& folder : dataFolders()) {
-    std::error_code none;
-    for (const auto& entry : std::filesystem::directory_iterator(folder / "printers", none)) {
+  for (const std::filesystem::path& data : dataFolders()) {
+    const std::filesystem::path folder = data / "printers";
+    std::error_code error;
+    const std::filesystem::directory_iterator entries(folder, error);
+    if (error && error != std::errc::no_such_file_or_directory &&
+        error != std::errc::not_a_directory)
+      throw DataError("cannot read '" + folder.string() + "': " + error.message());
+    for (const auto& entry : entries) {
       const bool is_profile =
           entry.path().extension() == ".json" && entry.path().stem() != "schema";
       if (is_profile) names.push_back(entry.path().stem());

@@ -37,21 +37,30 @@ int rename(const char* old, const char* name) { note("rename", name); return ((i
 
 
 class Flush(ProgramTest):
-    def test_files_and_folders_are_on_the_disk_before_they_have_their_names(self):
+    def calls(self, *options):
+        """Returns the calls of a run that writes a file and a folder: what was done, and to which path."""
         (self.folder / "calls.c").write_text(SOURCE)
         library = self.folder / "calls.so"
         subprocess.run(["cc", "-shared", "-fPIC", "-o", library, self.folder / "calls.c", "-ldl"], check=True)
         meshes.write_stl(self.folder / "part.stl", meshes.box((1, 1, 0.3)))
         calls = self.folder / "calls.txt"
         environment = {**os.environ, "LD_PRELOAD": str(library), "CALLS": str(calls)}
+        self.succeed("mesh2sdf", "part.stl", "--pitch", "0.1mm", "!", "dither", "!", "write", "part.vdb", "!", "slice-export", "out", *options,
+                     env=environment)
+        return [line.split(" ", 1) for line in calls.read_text().splitlines()]
+
+    def test_files_and_folders_are_on_the_disk_before_they_have_their_names(self):
         home = self.folder.resolve()
-        self.succeed("mesh2sdf", "part.stl", "--pitch", "0.1mm", "!", "dither", "!", "write", "part.vdb", "!", "slice-export", "out", env=environment)
-        done = [line.split(" ", 1) for line in calls.read_text().splitlines()]
+        done = self.calls()
         for name, flush in (("part.vdb", "fsync"), ("out", "syncfs")):
             at = done.index(["rename", str(home / name)] if ["rename", str(home / name)] in done else ["rename", name])
             before = [call for call, path in done[:at] if f".{name}.partial-" in path]
             self.assertEqual(before, [flush], (name, done))
             self.assertIn(["fsync", str(home)], done[at:], (name, done))
+
+    def test_nothing_waits_for_the_disk_where_that_is_not_wanted(self):
+        self.assertEqual([call for call, _ in self.calls("--no-flush")], ["rename", "rename"])
+        self.assertTrue((self.folder / "part.vdb").is_file() and (self.folder / "out").is_dir())
 
 
 if __name__ == "__main__":

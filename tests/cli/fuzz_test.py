@@ -38,6 +38,9 @@ WORDS = ("name", "pitch_mm", "kubelka_munk", "yule_nielsen", "absorption", "scat
          "--triple", "--coord", "--text", "white", "!", "\\x", "0.1mm,0.2mm,0.3mm")
 STACK_WORDS = ("\n@@ ", "@@ manifest.json", "sha256", "slices", "layout", "lattice", "materials", "format", "padding", "flip_x",
                "NumberOfSlices", "StartIndex", "VoxelCount", "imagesheet", "transform", "config.ini", "displayWidth")
+VDB_WORDS = ("Tree_float_5_4_3", "Tree_bool_5_4_3", "Tree_vec3s_5_4_3", "Tree_mask_5_4_3", "Tree_int32_5_4_3", "_HalfFloat", "AffineMap",
+             "ScaleMap", "UniformScaleMap", "UniformScaleTranslateMap", "NonlinearFrustumMap", "is_saved_as_half_float", "bool",
+             "__delayedload", "vdbdither:box", "vdbdither:layers", "vdbdither:frame", "head", "slab 0 8", "end 8", "\n@@\n", " BDV")
 
 
 @unittest.skipUnless(FUZZERS, "the fuzzers are not built")
@@ -137,6 +140,23 @@ class Fuzzers(ProgramTest):
             return [(str(file.relative_to(path)), file.read_bytes()) for file in sorted(path.rglob("*")) if file.is_file()]
         with zipfile.ZipFile(path) as archive:
             return [(name, archive.read(name)) for name in archive.namelist()]
+
+    def test_the_readers_of_archives(self):
+        # In one branch of the tree, whose masks alone take 9 KiB.
+        meshes.write_stl(self.folder / "part.stl", meshes.box((1, 1, 1), (9, 9, 9)))
+        for stage, chain in (("surface", ()), ("solid", ("!", "dither")), ("N", ("!", "normals"))):
+            for codec in ("mask", "blosc"):
+                self.succeed("mesh2sdf", "part.stl", "--pitch", "0.25mm", *chain, "!", "write", "x.vdb", "--overwrite", "--codec", codec)
+                archive = (self.folder / "x.vdb").read_bytes()
+                # Without the checksum in the UUID, like those of other programs.
+                foreign = archive[:21] + b"00000000-0000-4000-8000-000000000000" + archive[57:]
+                (self.seeds / f"{stage}-{codec}").write_bytes(b"f" + foreign)
+        frames = self.succeed("mesh2sdf", "part.stl", "--pitch", "0.25mm", "--slab", "8")
+        magic = frames[:8]
+        (self.seeds / "pipe").write_bytes(b"p" + b"\n@@\n".join(magic + part for part in frames.split(magic)[1:]))
+        self.succeed("mask", "--size", "8", "--kind", "white", "-o", "mask.vdb")
+        (self.seeds / "mask").write_bytes(b"m" + (self.folder / "mask.vdb").read_bytes())
+        self.fuzz("vdb_fuzz", VDB_WORDS, ["-max_len=32768"])
 
     def test_the_readers_of_texts(self):
         materials = [{"index": 1, "name": "white", "rgba": [1, 2, 3, 4]}]

@@ -31,7 +31,10 @@ constexpr std::array<Choice<Progress>, 3> progress_styles{
 
 }  // namespace
 
-void RunOptions::declareThreads(Options& options) {
+void RunOptions::declareWork(Options& options) {
+  options.flag("no-flush", no_flush,
+               "Does not wait until outputs are on the disk: faster, but a machine that stops may "
+               "lose outputs of runs that have ended");
   options.integer("threads", threads, {0, 4096}, "Number of threads; 0 takes all");
 }
 
@@ -44,7 +47,7 @@ void RunOptions::declareWords(Options& options) {
 }
 
 void RunOptions::declareForTool(Options& options) {
-  declareThreads(options);
+  declareWork(options);
   declareWords(options);
 }
 
@@ -56,7 +59,7 @@ void RunOptions::declare(Options& options) {
                "Writes this file instead of standard output, where the chain has no sink");
   options.letter('o');
   options.flag("overwrite", overwrite, "Replaces the output if it exists");
-  declareThreads(options);
+  declareWork(options);
   options.parsed(
       "slab", "N", [this](const std::string& text) { slab = checkedSlab(text); },
       [this] { return slab; }, "Number of layers worked on at a time, a multiple of 8");

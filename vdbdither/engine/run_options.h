@@ -19,6 +19,7 @@ struct RunOptions {
   std::string input;   ///< .vdb for a chain that begins without a source; empty: standard input
   std::string output;  ///< .vdb for a chain that ends without a sink; empty: standard output
   bool overwrite = false;
+  bool no_flush = false;
   int threads = 0;            ///< 0: all
   std::string slab = "auto";  ///< or all, or a multiple of 8
   std::string memory = "auto";
@@ -37,7 +38,7 @@ struct RunOptions {
   void declareForTool(Options& options);
 
  private:
-  void declareThreads(Options& options);
+  void declareWork(Options& options);
   void declareWords(Options& options);
 };
 

@@ -22,7 +22,8 @@ struct ToolInfo {
   std::string_view example;  ///< a command line without the name of the program
   std::unique_ptr<Tool> (*make)();
   bool hidden = false;  ///< used by builds and left out of manuals
-  /// Takes the options of a run that apply to a tool: threads, progress, quiet and verbose.
+  /// Takes the options of a run that apply to a tool: threads, progress, no-flush, quiet and
+  /// verbose.
   bool takes_run_options = false;
 };
 

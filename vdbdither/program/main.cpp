@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
 #include "io/vdb/vdb.h"
 #include "vdbdither/engine/chain.h"
@@ -123,6 +124,7 @@ void runReported(Job& job, Console& console, Clock::time_point start, const Func
 
 void runTool(ToolRun&& tool) {
   watchForInterrupts();
+  if (tool.options().no_flush) StagedOutput::leaveFlushOut();
   const GrantedThreads threads;
   const Clock::time_point start = Clock::now();
   Console console(tool.options().progress);
@@ -136,6 +138,7 @@ void runChain(const std::vector<Step>& steps) {
   if (const OperatorInfo* info = pipeline.helpWanted())
     return printData(helpText(pageOf(*info)).c_str());
   watchForInterrupts();
+  if (options.no_flush) StagedOutput::leaveFlushOut();
   const GrantedThreads threads;
   const Clock::time_point start = Clock::now();
   Console console(options.progress);

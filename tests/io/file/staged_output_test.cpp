@@ -10,6 +10,7 @@
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <thread>
+#include <tuple>
 #include <unistd.h>
 
 #include <gmock/gmock.h>
@@ -313,6 +314,44 @@ TEST_F(OldStack, SurvivesARunThatIsKilledBeforeOrAfterTheRenames) {
     });
     EXPECT_EQ(test::filesUnder(scratch_ / "out") == before, renames == 0);
   }
+}
+
+TEST(StagedOutput, WhatAnotherRunHasWrittenMeanwhileIsNotReplacedUnasked) {
+  const test::ScratchFolder scratch;
+  const auto late = [&](const std::string& name, Kind kind, bool overwrite) {
+    const fs::path path = scratch / name;
+    StagedOutput::check(path, kind, overwrite);
+    StagedOutput output(path, kind);
+    // Another run is the first to give its output the name.
+    if (kind == Kind::folder) {
+      output.write("slice", two);
+      fs::create_directory(path);
+      put(path / "slice", one);
+    } else {
+      put(output.path(), two);
+      put(path, one);
+    }
+    output.commit();
+  };
+  for (const bool exchange : {true, false}) {
+    exchanges = exchange;
+    const std::string tag = exchange ? "a" : "b";
+    for (const auto& [name, kind, file] :
+         {std::tuple("file", Kind::file, ""), {"folder", Kind::folder, "/slice"}}) {
+      const std::string kept = name + tag;
+      const auto commit = [&, kind = kind] { late(kept, kind, false); };
+      EXPECT_THAT(commit, ThrowsMessage<DataError>("cannot replace '" + (scratch / kept).string() +
+                                                   "': File exists; the new one is '" +
+                                                   (scratch / kept).string() + ".new'"));
+      const auto files = test::filesUnder(scratch.path());
+      EXPECT_EQ(files.at(kept + file), one);
+      EXPECT_EQ(files.at(kept + ".new" + file), two);
+      const std::string replaced = name + tag + "-replaced";
+      late(replaced, kind, true);
+      EXPECT_EQ(test::filesUnder(scratch.path()).at(replaced + file), two);
+    }
+  }
+  exchanges = true;
 }
 
 TEST(StagedOutput, ALinkStaysAndWhatItLeadsToIsReplaced) {

@@ -1,15 +1,13 @@
 #include "io/vdb/archive_reader.h"
 
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/io/Stream.h>
 
 #include "io/vdb/archive_digest.h"
+#include "tests/support/archive_bytes.h"
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/openvdb.h"
@@ -18,44 +16,19 @@ namespace vdbdither {
 namespace {
 
 using openvdb::FloatGrid;
+using test::archiveHeader;
+using test::bytesOf;
+using test::count;
+using test::metadataEntry;
+using test::sized;
+using test::streamOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Key;
 using testing::StartsWith;
 using testing::ThrowsMessage;
 
-template <typename T>
-std::string bytesOf(T value) {
-  std::string bytes(sizeof value, '\0');
-  std::memcpy(bytes.data(), &value, sizeof value);
-  return bytes;
-}
-
-std::string sized(const std::string& text) {
-  return bytesOf(static_cast<std::uint32_t>(text.size())) + text;
-}
-
-/// The header of an archive of another tool.
-std::string header(std::uint32_t version = openvdb::OPENVDB_FILE_VERSION) {
-  return bytesOf(std::int64_t{openvdb::OPENVDB_MAGIC}) + bytesOf(version) +
-         bytesOf(std::uint32_t{10}) + bytesOf(std::uint32_t{0}) + std::string(1, '\0') +
-         "0856ea5b-a483-4314-a8bd-a286b9e7daa0";
-}
-
-std::string count(std::uint32_t number) { return bytesOf(number); }
-
-std::string entry(const std::string& key, const std::string& type, const std::string& value) {
-  return sized(key) + sized(type) + sized(value);
-}
-
 VdbContents read(const std::string& bytes) { return contentsOfBytes(bytes, "it"); }
-
-/// What other tools write to a pipe.
-std::string streamOf(const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata = {}) {
-  std::ostringstream stream(std::ios::binary);
-  openvdb::io::Stream(stream).write(grids, metadata);
-  return stream.str();
-}
 
 FloatGrid::Ptr named(const std::string& name, float value = 1) {
   const auto grid = FloatGrid::create(0);
@@ -102,48 +75,50 @@ TEST_F(ArchiveReading, NamesAndKeysBecomePrintable) {
 }
 
 TEST_F(ArchiveReading, CountsAndSizesAreRefusedBeforeTheyAreRead) {
-  EXPECT_THAT(reading(header() + count(1000000)),
+  EXPECT_THAT(reading(archiveHeader() + count(1000000)),
               ThrowsMessage<DataError>(
                   "it: its metadata has 1000000 entries of metadata; at most 10000 are read; "
                   "mend it in the tool that it comes from"));
-  EXPECT_THAT(reading(header() + count(1) + count(0xFFFFFFF0U)),
+  EXPECT_THAT(reading(archiveHeader() + count(1) + count(0xFFFFFFF0U)),
               ThrowsMessage<DataError>(HasSubstr(
                   "its metadata has a key of metadata of 4.0 GiB; at most 4.0 KiB are read")));
-  EXPECT_THAT(reading(header() + count(1) + sized("key") + sized("string") + count(0xFFFFFFF0U)),
-              ThrowsMessage<DataError>(
-                  HasSubstr("has 4.0 GiB of metadata or more; at most 64 MiB are read")));
-  EXPECT_THAT(reading(header() + count(0) + count(2000000000)),
+  EXPECT_THAT(
+      reading(archiveHeader() + count(1) + sized("key") + sized("string") + count(0xFFFFFFF0U)),
+      ThrowsMessage<DataError>(
+          HasSubstr("has 4.0 GiB of metadata or more; at most 64 MiB are read")));
+  EXPECT_THAT(reading(archiveHeader() + count(0) + count(2000000000)),
               ThrowsMessage<DataError>(HasSubstr("has 2000000000 grids; at most 10000 are read")));
-  EXPECT_THAT(reading(header() + count(0) + count(1) + count(100000000)),
+  EXPECT_THAT(reading(archiveHeader() + count(0) + count(1) + count(100000000)),
               ThrowsMessage<DataError>(HasSubstr("grid 1 has a name of 95 MiB; at most 4.0 KiB")));
   const std::string grid =
       sized("a") + sized("Tree_float_5_4_3") + sized("") + std::string(24, '\0') + count(0);
-  EXPECT_THAT(reading(header() + count(0) + count(1) + grid + count(1000000)),
+  EXPECT_THAT(reading(archiveHeader() + count(0) + count(1) + grid + count(1000000)),
               ThrowsMessage<DataError>(HasSubstr("grid 'a' has 1000000 entries of metadata")));
 }
 
 TEST_F(ArchiveReading, SizesBeyondTheEndAreDamage) {
-  EXPECT_THAT(reading(header() + count(1) + sized("key") + sized("string") + count(5000)),
+  EXPECT_THAT(reading(archiveHeader() + count(1) + sized("key") + sized("string") + count(5000)),
               ThrowsMessage<DataError>("it is not a readable VDB archive: it ends too early"));
-  EXPECT_THAT(reading(header() + count(1) + entry("key", "int32", "12345678")),
+  EXPECT_THAT(reading(archiveHeader() + count(1) + metadataEntry("key", "int32", "12345678")),
               ThrowsMessage<DataError>("it is not a readable VDB archive: the metadata 'key' of "
                                        "its metadata is damaged"));
-  EXPECT_THAT(reading(header()),
+  EXPECT_THAT(reading(archiveHeader()),
               ThrowsMessage<DataError>("it is not a readable VDB archive: it ends too early"));
 }
 
 TEST_F(ArchiveReading, MetadataOfUnknownTypesIsKept) {
-  const VdbContents contents =
-      read(header() + count(1) + entry("key", "a_type_of_a_plug_in", "1234") + count(0));
+  const VdbContents contents = read(archiveHeader() + count(1) +
+                                    metadataEntry("key", "a_type_of_a_plug_in", "1234") + count(0));
   EXPECT_TRUE(contents.metadata.contains("key"));
 }
 
 TEST_F(ArchiveReading, OtherVersionsAndTypesAreNamed) {
-  EXPECT_THAT(reading(header(225)),
+  EXPECT_THAT(reading(archiveHeader(225)),
               ThrowsMessage<DataError>(HasSubstr(
                   "its format is 225, and those from 222 to 224 are read; save it again")));
-  EXPECT_THAT(reading(header(212)), ThrowsMessage<DataError>(HasSubstr("its format is 212,")));
-  EXPECT_THAT(reading(header() + count(0) + count(1) + sized("a") + sized("Tree_ax_1")),
+  EXPECT_THAT(reading(archiveHeader(212)),
+              ThrowsMessage<DataError>(HasSubstr("its format is 212,")));
+  EXPECT_THAT(reading(archiveHeader() + count(0) + count(1) + sized("a") + sized("Tree_ax_1")),
               ThrowsMessage<DataError>(
                   HasSubstr("grid 'a' is of type 'Tree_ax_1', which OpenVDB does not know")));
 }
