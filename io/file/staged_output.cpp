@@ -8,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <shared_mutex>
+#include <spawn.h>
 #include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
@@ -98,6 +99,11 @@ class Written {
     const std::lock_guard lock(mutex_);
     partials_[keyOf(target)].clear();
   }
+  /// What is still to be removed of a target that has its name.
+  void rememberRemains(const fs::path& target, const fs::path& remains) {
+    const std::lock_guard lock(mutex_);
+    partials_[keyOf(target)] = remains;
+  }
   bool contains(const fs::path& target) {
     const std::lock_guard lock(mutex_);
     return partials_.contains(keyOf(target));
@@ -156,6 +162,41 @@ std::vector<fs::directory_entry> entriesBelow(const fs::path& folder) {
     entries.push_back(*entry);
   if (error) fail("read", folder, error.value());
   return entries;
+}
+
+/// Removes a file or folder, or as much of it as can be removed until then.
+void removeUntil(const fs::path& path, std::chrono::steady_clock::time_point end) {
+  std::error_code error;
+  fs::recursive_directory_iterator entry(path, error);
+  for (; !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) {
+    if (std::chrono::steady_clock::now() > end) return;
+    std::error_code ignored;
+    if (entry->symlink_status(ignored).type() != fs::file_type::directory)
+      fs::remove(entry->path(), ignored);
+  }
+  // Another thread may remove the same files, which ends an attempt early.
+  for (int attempt = 0; attempt < 10 && isThere(path); ++attempt) fs::remove_all(path, error);
+}
+
+/// Lets a process of its own remove what is left, which goes on when this one has ended. Returns
+/// false if there is none.
+bool removedBehind(const std::vector<fs::path>& paths) {
+  std::vector<std::string> words{"rm", "-rf", "--"};
+  for (const fs::path& path : paths) words.push_back(path.string());
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t files;
+  posix_spawnattr_t attributes;
+  ::posix_spawn_file_actions_init(&files);
+  ::posix_spawnattr_init(&attributes);
+  // Whoever waits for the end of the standard streams waits for this program, not for that one.
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    ::posix_spawn_file_actions_addopen(&files, stream, "/dev/null", O_RDWR, 0);
+  ::posix_spawn_file_actions_addclosefrom_np(&files, STDERR_FILENO + 1);
+  // Out of reach of the next Ctrl-C.
+  ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID);
+  return ::posix_spawnp(nullptr, "rm", &files, &attributes, arguments.data(), environ) == 0;
 }
 
 bool isFolder(const fs::directory_entry& entry) {
@@ -321,11 +362,13 @@ void StagedOutput::leaveFlushOut() { flushes = false; }
 void StagedOutput::abandonAll(std::chrono::milliseconds patience) {
   // Never unlocked. A write to a network disk that does not answer may hold it: then go on without.
   (void)Written::all().naming.try_lock_for(patience);
-  for (const fs::path& path : Written::all().partials()) {
-    std::error_code ignored;
-    // Another thread may remove the same files, which ends an attempt early.
-    for (int attempt = 0; attempt < 10 && isThere(path); ++attempt) fs::remove_all(path, ignored);
-  }
+  const std::vector<fs::path> paths = Written::all().partials();
+  const auto end = std::chrono::steady_clock::now() + patience;
+  for (const fs::path& path : paths) removeUntil(path, end);
+  // A disk may take milliseconds for each of thousands of slices.
+  if (std::none_of(paths.begin(), paths.end(), isThere) || removedBehind(paths)) return;
+  for (const fs::path& path : paths)
+    removeUntil(path, std::chrono::steady_clock::time_point::max());
 }
 
 void StagedOutput::removeLeftovers() const {
@@ -447,6 +490,7 @@ void StagedOutput::retire(const fs::path& old) const {
       fs::rename(entry.path(), target_ / name, ignored);
     }
   }
+  Written::all().rememberRemains(target_, old);
   for (const fs::directory_entry& entry : entriesBelow(old)) {
     // Own files, and those that a file of the new output replaces.
     const fs::path name = entry.path().lexically_relative(old);

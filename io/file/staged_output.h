@@ -70,7 +70,8 @@ class StagedOutput {
   /// Removes all outputs of the process that are not committed, and lets none be committed or
   /// written to any more: threads that try stay where they are. For a process that ends without
   /// its destructors.
-  /// \param patience  how long to wait for a write that is under way
+  /// \param patience  how long to wait for a write that is under way, and then to remove files;
+  ///                  another process removes those that are left
   static void abandonAll(std::chrono::milliseconds patience);
 
  private:

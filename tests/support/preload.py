@@ -4,7 +4,8 @@ import os
 import subprocess
 
 # Calls that change files are numbered from 1. `KILL_AT=n` ends the process before call n, `FAIL_AT=n` makes it fail with FAIL_AS,
-# and with FAIL_ON every later one that takes space, `FAIL_CLOSE` each close of a file that was written. CALLS receives the names of the calls.
+# and with FAIL_ON every later one that takes space, FAIL_CLOSE each close of a file that was written. To remove a file takes
+# SLOW_MS longer. CALLS receives the names of the calls.
 CHANGES = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -111,10 +112,10 @@ int renameat2(int old, const char* from, int new, const char* to, unsigned flags
   if (flags && number("NO_EXCHANGE")) { errno = EINVAL; return -1; }
   return fails("rename") ? -1 : real(old, from, new, to, flags);
 }
-int unlinkat(int folder, const char* path, int flags) { REAL(int, "unlinkat", int, const char*, int); return fails("remove") ? -1 : real(folder, path, flags); }
+int unlinkat(int folder, const char* path, int flags) { usleep(1000 * number("SLOW_MS")); REAL(int, "unlinkat", int, const char*, int); return fails("remove") ? -1 : real(folder, path, flags); }
 int unlink(const char* path) { REAL(int, "unlink", const char*); return fails("remove") ? -1 : real(path); }
 int rmdir(const char* path) { REAL(int, "rmdir", const char*); return fails("remove") ? -1 : real(path); }
-int remove(const char* path) { REAL(int, "remove", const char*); return fails("remove") ? -1 : real(path); }
+int remove(const char* path) { usleep(1000 * number("SLOW_MS")); REAL(int, "remove", const char*); return fails("remove") ? -1 : real(path); }
 """
 
 # Each look at a clock finds it a day later than the one before, or a day earlier, in turn, or always later: CLOCK=later.

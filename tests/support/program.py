@@ -100,6 +100,19 @@ class ProgramTest(unittest.TestCase):
         """Returns all files in the folder with their sizes, including hidden files."""
         return sorted((str(path.relative_to(self.folder)), path.stat().st_size) for path in self.folder.rglob("*"))
 
+    def expect_removed(self, before):
+        """Checks that the folder is as `before`, or soon will be: what a stopped run wrote may be removed behind it."""
+        deadline = time.monotonic() + 60 * PATIENCE
+        while True:
+            try:
+                after = self.listing()
+            except FileNotFoundError:
+                after = None
+            if after == before:
+                return
+            self.assertLess(time.monotonic(), deadline, after)
+            time.sleep(0.01)
+
     def as_nobody(self):
         """The keywords that run the program as a user without rights. Skips the test where only root may run the program."""
         keywords = {"user": 65534, "group": 65534, "extra_groups": []}
