@@ -26,8 +26,8 @@ LLVM_PROFILE_FILE="$build/counts/%4m.profraw" run_tests --preset coverage --para
 llvm-profdata-14 merge --sparse --output "$build/counts/all.profdata" "$build"/counts/*.profraw
 objects=()
 for program in "$build"/tests/{model,engine,io,kernels,ops}_test; do objects+=(--object "$program"); done
-shown=("$build/vdbdither" "${objects[@]}" --instr-profile "$build/counts/all.profdata")
-llvm-cov-14 export --summary-only "${shown[@]}" vdbdither io ops >"$build/coverage.json" 2>"$build/coverage.log"
-llvm-cov-14 show --format html --output-dir "$build/html" "${shown[@]}" vdbdither io ops 2>>"$build/coverage.log"
+shown=("$build/vdbdither" "${objects[@]}" --instr-profile "$build/counts/all.profdata" --ignore-filename-regex "/(tests|usr|generated)/")
+llvm-cov-14 export --summary-only "${shown[@]}" >"$build/coverage.json" 2>"$build/coverage.log"
+llvm-cov-14 show --format html --output-dir "$build/html" "${shown[@]}" 2>>"$build/coverage.log"
 /usr/bin/python3 tests/support/line_coverage.py "$build/coverage.json"
 exit "$status"

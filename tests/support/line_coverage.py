@@ -25,7 +25,7 @@ def main():
     data, = json.loads(pathlib.Path(sys.argv[1]).read_text())["data"]
     lines, files = collections.defaultdict(lambda: [0, 0]), []
     for entry in data["files"]:
-        path = pathlib.Path(entry["filename"])
+        path = pathlib.Path(entry["filename"]).resolve()
         if ROOT not in path.parents or not (place := layer_of(path.relative_to(ROOT))):
             continue
         count, covered = (entry["summary"]["lines"][key] for key in ("count", "covered"))
