@@ -14,7 +14,9 @@ import meshes
 from program import ProgramTest
 
 FUZZERS = os.environ.get("VDBDITHER_FUZZERS", "")
-SECONDS = int(os.environ.get("VDBDITHER_FUZZ_SECONDS", "15"))
+SECONDS = int(os.environ.get("VDBDITHER_FUZZ_SECONDS", "10"))
+# Keeps the units of each fuzzer, what it says, and what it finds.
+KEPT = os.environ.get("VDBDITHER_FUZZ_FOLDER", "")
 
 MODEL = """<?xml version="1.0" encoding="UTF-8"?>
 <model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
@@ -55,10 +57,15 @@ class Fuzzers(ProgramTest):
             escaped = ("".join(f"\\x{byte:02x}" for byte in word.encode()) for word in words)
             (self.folder / "words").write_text("".join(f'"{word}"\n' for word in escaped))
             arguments = (*arguments, "-dict=words")
-        done = subprocess.run([pathlib.Path(FUZZERS) / name, f"-max_total_time={SECONDS}", "-seed=1", "-timeout=10",
-                               "-rss_limit_mb=2000", "-max_len=8192", "-verbosity=0", *arguments, self.seeds],
-                              cwd=self.folder, stdin=subprocess.DEVNULL, capture_output=True, timeout=SECONDS + 600)
-        self.assertEqual(done.returncode, 0, done.stderr.decode(errors="replace")[-4000:])
+        units = pathlib.Path(KEPT or self.folder).resolve() / name
+        (units / "units").mkdir(parents=True, exist_ok=True)
+        with open(units / "log", "w+b") as log:
+            done = subprocess.run([pathlib.Path(FUZZERS) / name, f"-max_total_time={SECONDS}", "-seed=1", "-timeout=10",
+                                   "-rss_limit_mb=2000", "-max_len=8192", "-print_final_stats=1", f"-artifact_prefix={units}/",
+                                   *arguments, units / "units", self.seeds],
+                                  cwd=self.folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log, timeout=SECONDS + 600)
+            log.seek(0)
+            self.assertEqual(done.returncode, 0, log.read().decode(errors="replace")[-4000:])
 
     def write_model(self):
         with zipfile.ZipFile(self.seeds / "model.3mf", "w", zipfile.ZIP_DEFLATED) as archive:
