@@ -184,6 +184,7 @@ bool removedBehind(const std::vector<fs::path>& paths) {
   std::vector<std::string> words{"rm", "-rf", "--"};
   for (const fs::path& path : paths) words.push_back(path.string());
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t files;

@@ -167,30 +167,33 @@ class TreePass {
     if (layout_.leaf == TreeLayout::Leaf::flags) cursor_.skip(Mask<leaf_log2>::bytes);
   }
 
-  /// The values of a node, as openvdb::io::readCompressedValues takes them.
-  template <int log2_dim>
-  void passValues(const Mask<log2_dim>& active) {
-    const auto kind = cursor_.take<std::int8_t>();
+  /// How many values of inactive voxels stand before those of a node that is packed so.
+  static int inactiveValues(int kind) {
     switch (kind) {
       case openvdb::io::NO_MASK_OR_INACTIVE_VALS:
       case openvdb::io::NO_MASK_AND_MINUS_BG:
       case openvdb::io::NO_MASK_AND_ALL_VALS:
-        break;
-      case openvdb::io::NO_MASK_AND_ONE_INACTIVE_VAL:
-        passValue();
-        break;
-      case openvdb::io::MASK_AND_TWO_INACTIVE_VALS:
-        passValue();
-        [[fallthrough]];
-      case openvdb::io::MASK_AND_ONE_INACTIVE_VAL:
-        passValue();
-        [[fallthrough]];
       case openvdb::io::MASK_AND_NO_INACTIVE_VALS:
-        cursor_.skip(Mask<log2_dim>::bytes);
-        break;
+        return 0;
+      case openvdb::io::NO_MASK_AND_ONE_INACTIVE_VAL:
+      case openvdb::io::MASK_AND_ONE_INACTIVE_VAL:
+        return 1;
+      case openvdb::io::MASK_AND_TWO_INACTIVE_VALS:
+        return 2;
       default:
         throw DamagedBytes{"its values are packed in an unknown way"};
     }
+  }
+
+  /// The values of a node, as openvdb::io::readCompressedValues takes them.
+  template <int log2_dim>
+  void passValues(const Mask<log2_dim>& active) {
+    const auto kind = cursor_.take<std::int8_t>();
+    for (int values = inactiveValues(kind); values > 0; --values) passValue();
+    const bool has_selection = kind == openvdb::io::MASK_AND_NO_INACTIVE_VALS ||
+                               kind == openvdb::io::MASK_AND_ONE_INACTIVE_VAL ||
+                               kind == openvdb::io::MASK_AND_TWO_INACTIVE_VALS;
+    if (has_selection) cursor_.skip(Mask<log2_dim>::bytes);
     const bool only_active = (packing_.compression & openvdb::io::COMPRESS_ACTIVE_MASK) != 0 &&
                              kind != openvdb::io::NO_MASK_AND_ALL_VALS;
     passPacked(only_active ? active.countOn() : std::uint32_t{1} << (3 * log2_dim));
