@@ -165,13 +165,18 @@ TEST(SliceExport, APartThatReachesBeyondTheTrayIsRefused) {
   job.schema.metadata["vdbdither:printer"] =
       R"({"name":"p","pitch_mm":[0.042,0.084,0.022],"slice_px":[8,8],"materials":[]})";
   EXPECT_NO_THROW(Export({scratch / "in", "--tray", "placed"}).run(job));
-  job.grids["material"] = drawnMaterial({{"1........2"}}, 4);
-  EXPECT_THAT(
-      [&] {
-        Export({scratch / "out", "--tray", "placed"}).run(job);
-      },
-      ThrowsMessage<DataError>("the part reaches beyond the display or tray; make it "
-                               "smaller, or give --tray centred"));
+  // In the lowest slab, and only in one above it.
+  job.schema.lattice.box.max().z() = 8;
+  for (const auto& layers : {std::vector<std::vector<std::string>>{{"1........2"}},
+                             {{"1....."}, {"1....."}, {"1....."}, {"1....."}, {"1........2"}}}) {
+    job.grids["material"] = drawnMaterial(layers, 4);
+    EXPECT_THAT(
+        [&] {
+          Export({scratch / "out", "--tray", "placed"}).run(job);
+        },
+        ThrowsMessage<DataError>("the part reaches beyond the display or tray; make it "
+                                 "smaller, or give --tray centred"));
+  }
 }
 
 TEST(SliceExport, AJobForAPrinterHasItsMinimumOfSlices) {
