@@ -1,5 +1,6 @@
 #include "ops/kernels/leaf/copies.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -24,8 +25,8 @@ class Copies : public Filter {
     options.integer("columns", counts_[0], {1, most_copies}, "Number of copies along x");
     options.integer("rows", counts_[1], {1, most_copies}, "Number of copies along y");
     options.length("gap", gap_mm_, {0, 1000},
-                   "Distance between the boxes of copies, at least; up to seven voxels more are "
-                   "left, because copies are moved by whole leaf nodes");
+                   "Distance between the boxes of copies, at least; up to 14 voxels more are left, "
+                   "because copies are moved by whole leaf nodes");
   }
 
   Schema plan(const Schema& in) override {
@@ -37,9 +38,10 @@ class Copies : public Filter {
       const auto index = static_cast<std::size_t>(axis);
       const std::int64_t begin = floorDivided(in.lattice.box.min()[axis], leaf_layers);
       const std::int64_t end = floorDivided(in.lattice.box.max()[axis], leaf_layers) + 1;
-      const auto gap =
-          static_cast<std::int64_t>(std::ceil(gap_mm_ / in.lattice.pitch_mm[axis] / leaf_layers));
-      const std::int64_t stride = (end - begin + gap) * leaf_layers;
+      const std::int64_t width = in.lattice.box.dim()[axis];
+      const auto gap = static_cast<std::int64_t>(std::ceil(gap_mm_ / in.lattice.pitch_mm[axis]));
+      const std::int64_t stride = std::max(
+          (end - begin) * leaf_layers, (width + gap + leaf_layers - 1) / leaf_layers * leaf_layers);
       const std::int64_t last = in.lattice.box.max()[axis] + (counts_[index] - 1) * stride;
       constexpr std::int64_t farthest = 1 << 29;
       if (last > farthest) {

@@ -81,7 +81,7 @@ class Plan : public Tool {
 
  private:
   static std::set<std::string> ownFiles(const fs::path& folder) {
-    readJobFile(folder);
+    requireJob(folder);
     std::set<std::string> names{job_name};
     Job any;
     any.pieces.emplace_back();
@@ -89,7 +89,7 @@ class Plan : public Tool {
     return names;
   }
 
-  static void readJobFile(const fs::path& folder) {
+  static void requireJob(const fs::path& folder) {
     std::error_code none;
     if (!fs::exists(folder / job_name, none)) {
       throw UsageError("'" + folder.string() + "' holds no " + job_name +
