@@ -36,8 +36,11 @@ StackPiece stackPieceOf(std::span<const std::uint8_t> bytes) {
     return value;
   };
   StackPiece piece;
+  constexpr std::int64_t farthest = 1 << 29;
   constexpr std::uint64_t most_layers = 1 << 30;
-  piece.layers.begin = static_cast<int>(number());
+  const auto begin = static_cast<std::int64_t>(number());
+  if (begin < -farthest || begin > farthest) throw DataError("begins at a layer that none can be");
+  piece.layers.begin = static_cast<int>(begin);
   const std::uint64_t layers = number();
   piece.materials = number();
   if (layers > most_layers || piece.materials > bytes.size() ||

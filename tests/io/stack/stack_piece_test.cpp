@@ -33,6 +33,10 @@ TEST(StackPiece, IsRefusedWhereItIsCutShortOrClaimsMoreThanItHolds) {
   for (std::size_t size = 0; size < whole.size(); ++size) {
     EXPECT_THROW(stackPieceOf({whole.data(), size}), DataError) << size;
   }
+  Bytes far = whole;
+  far[24 + 5] = 1;
+  EXPECT_THAT([&] { stackPieceOf(far); },
+              ThrowsMessage<DataError>(HasSubstr("begins at a layer that none can be")));
   // The number of layers and of materials, each as large as can be.
   for (const std::size_t place : {std::size_t{32}, std::size_t{40}}) {
     Bytes wrong = whole;
