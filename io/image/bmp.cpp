@@ -23,9 +23,7 @@ constexpr double metre_mm = 1000;
 std::size_t rowBytes(std::uint32_t width) { return (std::size_t{width} + 31) / 32 * 4; }
 
 std::uint32_t numberAt(std::span<const std::uint8_t> bytes, std::size_t at, int size) {
-  std::uint32_t value = 0;
-  for (int i = 0; i < size; ++i) value |= std::uint32_t{bytes[at + i]} << 8 * i;
-  return value;
+  return static_cast<std::uint32_t>(littleEndian(bytes.subspan(at), size));
 }
 
 std::uint32_t perMetre(double pixel_mm) {

@@ -8,6 +8,7 @@
 #include <ImfChannelList.h>
 #include <ImfTileDescriptionAttribute.h>
 
+#include "io/file/little_endian.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -22,9 +23,7 @@ constexpr int multi_part_flag = 0x1000;
 
 int numberAt(Bytes bytes, std::size_t at) {
   if (at + 4 > bytes.size()) throw DataError("is not a readable EXR: it is cut short");
-  std::uint32_t value = 0;
-  for (std::size_t i = 0; i < 4; ++i) value |= std::uint32_t{bytes[at + i]} << 8 * i;
-  return static_cast<int>(value);
+  return static_cast<int>(littleEndian(bytes.subspan(at), 4));
 }
 
 /// Where the text at `at` ends, behind its zero.

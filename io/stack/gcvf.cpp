@@ -278,9 +278,7 @@ std::optional<DescribedStack> describeGcvf(const StackInput& files) {
 }
 
 double floatAt(std::span<const std::uint8_t> bytes, std::size_t at) {
-  std::uint32_t bits = 0;
-  for (std::size_t i = 0; i < 4; ++i) bits |= std::uint32_t{bytes[at + i]} << 8 * i;
-  return std::bit_cast<float>(bits);
+  return std::bit_cast<float>(static_cast<std::uint32_t>(littleEndian(bytes.subspan(at), 4)));
 }
 
 /// Returns a file that every GCVF has, or tells that it is missing.

@@ -28,13 +28,8 @@ std::vector<std::uint8_t> bytesOf(const StackPiece& piece) {
 StackPiece stackPieceOf(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < magic.size() || !std::equal(magic.begin(), magic.end(), bytes.begin()))
     throw DataError("is not of a piece of a stack");
-  bytes = bytes.subspan(magic.size());
-  const auto number = [&] {
-    if (bytes.size() < number_bytes) throw DataError("is cut short");
-    const std::uint64_t value = littleEndian(bytes, number_bytes);
-    bytes = bytes.subspan(number_bytes);
-    return value;
-  };
+  LittleEndianReader reader(bytes.subspan(magic.size()));
+  const auto number = [&] { return reader.take(number_bytes); };
   StackPiece piece;
   constexpr std::int64_t farthest = 1 << 29;
   constexpr std::uint64_t most_layers = 1 << 30;
@@ -43,13 +38,14 @@ StackPiece stackPieceOf(std::span<const std::uint8_t> bytes) {
   piece.layers.begin = static_cast<int>(begin);
   const std::uint64_t layers = number();
   piece.materials = number();
-  if (layers > most_layers || piece.materials > bytes.size() ||
-      layers * piece.materials > bytes.size() / number_bytes)
+  const std::size_t left = reader.rest().size();
+  if (layers > most_layers || piece.materials > left ||
+      layers * piece.materials > left / number_bytes)
     throw DataError("is cut short");
   piece.layers.end = piece.layers.begin + static_cast<int>(layers);
   piece.voxels.resize(layers * piece.materials);
   for (std::uint64_t& count : piece.voxels) count = number();
-  piece.preview.assign(bytes.begin(), bytes.end());
+  piece.preview.assign(reader.rest().begin(), reader.rest().end());
   return piece;
 }
 

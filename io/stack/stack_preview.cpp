@@ -109,12 +109,8 @@ std::vector<std::uint8_t> StackPreview::part() const {
 }
 
 void StackPreview::addPart(std::span<const std::uint8_t> bytes) {
-  const auto number = [&](int size) {
-    if (bytes.size() < static_cast<std::size_t>(size)) throw DataError("is cut short");
-    const std::uint64_t value = littleEndian(bytes, size);
-    bytes = bytes.subspan(static_cast<std::size_t>(size));
-    return value;
-  };
+  LittleEndianReader reader(bytes);
+  const auto number = [&](int size) { return reader.take(size); };
   const auto refuse = [] { throw DataError("is not of a piece of this stack"); };
   const auto value = [&] {
     const auto index = static_cast<std::uint32_t>(number(4));
@@ -148,7 +144,7 @@ void StackPreview::addPart(std::span<const std::uint8_t> bytes) {
       fullest_ = std::move(slice);
     }
   }
-  if (!bytes.empty()) refuse();
+  if (!reader.rest().empty()) refuse();
 }
 
 void StackPreview::look(const SpanImage& slice, Hit* hits) {
