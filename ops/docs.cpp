@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "io/file/staged_output.h"
+#include "io/file/text_bytes.h"
 #include "vdbdither/engine/manual.h"
 #include "vdbdither/engine/tool.h"
 
@@ -41,7 +42,7 @@ class Docs : public Tool {
       const std::filesystem::path path = std::filesystem::path(folder_) / name;
       std::error_code error;
       std::filesystem::create_directories(path.parent_path(), error);
-      writeFile(path, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, path);
+      writeFile(path, textBytes(text), path);
     }
   }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file/staged_output.h"
+#include "io/file/text_bytes.h"
 #include "ops/kernels/mask/slice_spectrum.h"
 #include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/operator.h"
@@ -89,8 +90,7 @@ class MaskSpectrum : public Sink {
     if (!metadata_) throw DataError("no layer of a mask came");
     const std::string text = jsonText(spectra(), 1) + "\n";
     StagedOutput output(file_, StagedOutput::Kind::file);
-    writeFile(output.path(), {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
-              file_);
+    writeFile(output.path(), textBytes(text), file_);
     output.commit();
   }
 

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file/staged_output.h"
+#include "io/file/text_bytes.h"
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/mesh_reader.h"
 #include "io/mesh/mesh_writer.h"
@@ -214,8 +215,7 @@ class SurfaceMeasurement {
     if (!report_file_.empty()) {
       const std::string text = jsonText(all, 1) + "\n";
       staged.emplace(report_file_, StagedOutput::Kind::file);
-      writeFile(staged->path(), {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
-                report_file_);
+      writeFile(staged->path(), textBytes(text), report_file_);
     }
     if (!map_file_.empty()) writeMap(mesh, errors, all["map_range_mm"].get<double>());
     if (staged) staged->commit();

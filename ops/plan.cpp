@@ -4,11 +4,11 @@
 #include <memory>
 #include <optional>
 #include <set>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "io/file/staged_output.h"
+#include "io/file/text_bytes.h"
 #include "io/job/job.h"
 #include "io/job/job_scripts.h"
 #include "vdbdither/engine/option_groups.h"
@@ -27,10 +27,6 @@ namespace fs = std::filesystem;
 
 /// An array of Slurm has at most 1,001 tasks unless its administrator allows more.
 constexpr int most_pieces = 1000;
-
-std::span<const std::uint8_t> bytesOf(const std::string& text) {
-  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
-}
 
 /// Cuts a chain into pieces that runs on many machines make, and writes what starts them.
 class Plan : public Tool {
@@ -219,27 +215,20 @@ class Plan : public Tool {
 
   void write(const Job& job) const {
     StagedOutput output(folder_, StagedOutput::Kind::folder, ownFiles);
-    output.write(job_name, bytesOf(textOf(job)));
-    for (const auto& [name, text] : jobScripts(job)) output.write(name, bytesOf(text));
+    output.write(job_name, textBytes(textOf(job)));
+    for (const auto& [name, text] : jobScripts(job)) output.write(name, textBytes(text));
     output.commit();
   }
 
   void tell(const Job& job) {
-    double memory = 0;
-    double disk = 0;
-    double seconds = 0;
-    bool is_known = true;
-    for (const JobPiece& piece : job.pieces) {
-      memory = std::max(memory, piece.memory_bytes);
-      disk += piece.disk_bytes;
-      seconds = std::max(seconds, piece.seconds.value_or(0));
-      is_known = is_known && piece.seconds;
-    }
+    const JobPiece largest = largestPiece(job);
+    double disk_bytes = 0;
+    for (const JobPiece& piece : job.pieces) disk_bytes += piece.disk_bytes;
     std::string text = "'" + folder_ + "': " + std::to_string(job.pieces.size()) +
                        (job.pieces.size() == 1 ? " piece of " : " pieces, each of at most ");
-    text += "about " + bytesText(memory) + " of memory" +
-            (is_known ? " and " + durationText(seconds) : std::string()) + "; in all about " +
-            bytesText(disk) + " on the disk\n";
+    text += "about " + bytesText(largest.memory_bytes) + " of memory" +
+            (largest.seconds ? " and " + durationText(*largest.seconds) : std::string()) +
+            "; in all about " + bytesText(disk_bytes) + " on the disk\n";
     report().print(text);
     report().count("pieces", static_cast<double>(job.pieces.size()));
   }

@@ -12,6 +12,7 @@
 #include "io/file/file_name.h"
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
+#include "io/file/text_bytes.h"
 #include "io/profile/printer_profile.h"
 #include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/option_groups.h"
@@ -217,8 +218,7 @@ class Printers : public Tool {
     StagedOutput::check(path, StagedOutput::Kind::file, overwrite_.overwrite);
     StagedOutput staged(path, StagedOutput::Kind::file);
     const std::string profile = profileToFillIn(path.stem().string());
-    writeFile(staged.path(),
-              {reinterpret_cast<const std::uint8_t*>(profile.data()), profile.size()}, path);
+    writeFile(staged.path(), textBytes(profile), path);
     staged.commit();
     if (json_.json) return jsonText({{"profile", printer_}}) + "\n";
     const std::string file = printable(quotedForShell(printer_));

@@ -5,6 +5,7 @@
 #include <new>
 #include <span>
 
+#include "io/file/text_bytes.h"
 #include "io/image/texture_builder.h"
 #include "vdbdither/model/errors.h"
 
@@ -86,8 +87,7 @@ Texture decodeTexture(std::string_view bytes, const std::string& shown, TextureO
                     std::string(what_to_do));
   }
   try {
-    return kind->decode({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()},
-                        opacity);
+    return kind->decode(textBytes(bytes), opacity);
   } catch (const DataError& error) {
     throw DataError(shown + " " + error.what());
   }

@@ -8,8 +8,8 @@
 
 #include "io/file/data_files.h"
 #include "io/file/digest.h"
-#include "io/file/file_digest.h"
 #include "io/file/files_read.h"
+#include "io/file/text_bytes.h"
 #include "io/file/whole_file.h"
 #include "io/vdb/mask_cache.h"
 #include "vdbdither/engine/json_text.h"
@@ -44,8 +44,8 @@ ordered_json jsonOf(const std::vector<JobInput>& inputs) {
   ordered_json json = ordered_json::array();
   for (const JobInput& input : inputs) {
     json.push_back({{input.is_data ? "data" : "file", input.file},
-                    {"bytes", input.bytes},
-                    {"sha256", input.sha256}});
+                    {"bytes", input.digest.bytes},
+                    {"sha256", input.digest.sha256}});
   }
   return json;
 }
@@ -80,9 +80,10 @@ class JobParser {
     for (const ordered_json& output : list(json_, "outputs")) job.outputs.push_back(textOf(output));
     for (const ordered_json& entry : list(json_, "inputs")) {
       const bool is_data = entry.is_object() && entry.contains("data");
-      job.inputs.push_back({text(entry, is_data ? "data" : "file"), is_data,
-                            static_cast<std::uint64_t>(number(entry, "bytes")),
-                            text(entry, "sha256")});
+      job.inputs.push_back(
+          {text(entry, is_data ? "data" : "file"),
+           is_data,
+           {static_cast<std::uint64_t>(number(entry, "bytes")), text(entry, "sha256")}});
     }
     int next = 0;
     for (const ordered_json& entry : list(json_, "pieces")) {
@@ -171,15 +172,24 @@ std::optional<fs::path> belowData(const fs::path& file) {
 JobInput inputOf(const fs::path& file) {
   const std::optional<fs::path> data = belowData(file);
   const std::optional<fs::path> here = below(fs::current_path(), file);
-  const FileDigest digest = digestOfFile(file);
-  return {(data   ? *data
-           : here ? *here
-                  : file)
-              .string(),
-          data.has_value(), digest.bytes, digest.sha256};
+  return {(data ? *data : here ? *here : file).string(), data.has_value(), digestOfFile(file)};
 }
 
 }  // namespace
+
+JobPiece largestPiece(const Job& job) {
+  JobPiece largest;
+  largest.seconds = 0;
+  for (const JobPiece& piece : job.pieces) {
+    largest.memory_bytes = std::max(largest.memory_bytes, piece.memory_bytes);
+    if (largest.seconds && piece.seconds) {
+      largest.seconds = std::max(*largest.seconds, *piece.seconds);
+    } else {
+      largest.seconds.reset();
+    }
+  }
+  return largest;
+}
 
 std::string textOf(const Job& job) {
   ordered_json json;
@@ -224,7 +234,7 @@ std::string identityOf(const Job& job) {
                           {"lattice", jsonOf(job.lattice)},
                           {"inputs", jsonOf(job.inputs)}};
   const std::string text = jsonText(json);
-  return sha256Of({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  return sha256Of(textBytes(text));
 }
 
 fs::path pieceFolder(const fs::path& job_folder, std::size_t number) {
@@ -254,8 +264,7 @@ void checkInputs(const Job& job) {
       throw DataError("the data file '" + input.file +
                       "' of the job is not installed here; install the same version everywhere");
     }
-    const FileDigest digest = digestOfFile(*file);
-    if (digest.bytes != input.bytes || digest.sha256 != input.sha256) {
+    if (digestOfFile(*file) != input.digest) {
       throw DataError("'" + file->string() +
                       "' is not the file that the job was planned with; put that one back, or plan "
                       "the job again");

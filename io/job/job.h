@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "io/file/file_digest.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
@@ -20,8 +21,7 @@ inline constexpr const char* pieces_name = "pieces";
 struct JobInput {
   std::string file;      ///< as the chain names it, or below the data folders of the program
   bool is_data = false;  ///< whether it is one of the program's own, such as a printer's profile
-  std::uint64_t bytes = 0;
-  std::string sha256;  ///< hexadecimal
+  FileDigest digest;
 };
 
 /// One of the runs that make a job together.
@@ -44,6 +44,9 @@ struct Job {
   std::vector<JobInput> inputs;
   std::vector<JobPiece> pieces;  ///< by number, from 0, in rising layers
 };
+
+/// The most time and memory that any piece takes. The time is unknown if that of some piece is.
+JobPiece largestPiece(const Job& job);
 
 /// The text of `job.json`.
 std::string textOf(const Job& job);

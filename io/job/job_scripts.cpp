@@ -31,18 +31,12 @@ Needs needsOf(const Job& job) {
   constexpr double memory_floor_mib = 256;
   constexpr double time_room = 4;  // machines differ
   constexpr int least_minutes = 10;
-  double bytes = 0;
-  double seconds = 0;
-  bool is_known = true;
-  for (const JobPiece& piece : job.pieces) {
-    bytes = std::max(bytes, piece.memory_bytes);
-    seconds = std::max(seconds, piece.seconds.value_or(0));
-    is_known = is_known && piece.seconds;
-  }
-  const int minutes = static_cast<int>(std::ceil(time_room * seconds / 60));
-  return {job.threads,
-          static_cast<int>(std::ceil(memory_floor_mib + memory_room * bytes / mebibyte)),
-          is_known ? std::max(least_minutes, minutes) : 0};
+  const JobPiece largest = largestPiece(job);
+  const int minutes = static_cast<int>(std::ceil(time_room * largest.seconds.value_or(0) / 60));
+  return {
+      job.threads,
+      static_cast<int>(std::ceil(memory_floor_mib + memory_room * largest.memory_bytes / mebibyte)),
+      largest.seconds ? std::max(least_minutes, minutes) : 0};
 }
 
 std::string lines(const Job& job) {

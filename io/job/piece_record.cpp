@@ -9,6 +9,7 @@
 #include "io/file/file_digest.h"
 #include "io/file/file_name.h"
 #include "io/file/staged_output.h"
+#include "io/file/text_bytes.h"
 #include "io/file/whole_file.h"
 #include "vdbdither/engine/json_text.h"
 #include "vdbdither/model/errors.h"
@@ -81,8 +82,7 @@ void writePieceRecord(const fs::path& folder, const PieceOf& piece) {
   for (const auto& [name, digest] : files)
     json["files"].push_back({{"file", name}, {"bytes", digest.bytes}, {"sha256", digest.sha256}});
   const std::string text = jsonText(json, 1) + "\n";
-  writeFile(folder / record_name, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
-            folder / record_name);
+  writeFile(folder / record_name, textBytes(text), folder / record_name);
 }
 
 std::optional<std::string> pieceProblem(const fs::path& folder, const PieceOf& piece) {

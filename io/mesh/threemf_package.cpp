@@ -7,6 +7,7 @@
 #include <charconv>
 #include <optional>
 
+#include "io/file/text_bytes.h"
 #include "io/file/xml_reader.h"
 
 namespace vdbdither {
@@ -42,10 +43,7 @@ class ThreemfRootReader : public XmlReader {
   std::optional<std::string> root_;
 };
 
-std::span<const std::uint8_t> bytesOf(const MeshFile& file) {
-  const std::string_view bytes = file.bytes();
-  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
-}
+std::span<const std::uint8_t> bytesOf(const MeshFile& file) { return textBytes(file.bytes()); }
 
 /// The path as names of parts are compared: from the root, in lower case, with the characters that
 /// it writes as %xx.

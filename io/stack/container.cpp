@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "io/file/file_name.h"
+#include "io/file/text_bytes.h"
 #include "io/image/png_spans.h"
 #include "io/image/srgb.h"
 #include "io/profile/printer_profile.h"
@@ -89,7 +90,7 @@ std::string resinOf(const Material& material, const PrinterProfile& printer) {
 }
 
 void writeText(StackOutput& output, const std::string& name, std::string_view text) {
-  output.write(name, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  output.write(name, textBytes(text));
 }
 
 Picture thumbnailOf(const SpanImage& image, std::uint32_t width, std::uint32_t height) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "io/file/text_bytes.h"
 #include "io/image/png_spans.h"
 #include "vdbdither/model/words.h"
 
@@ -13,7 +14,7 @@ void SliceEncoder::finish(const Manifest& stack, const SpanImage& preview,
                           StackOutput& output) const {
   output.write(preview_name, encodePng(preview, {}));
   const std::string text = textOf(stack);
-  output.write(manifest_name, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  output.write(manifest_name, textBytes(text));
 }
 
 std::vector<std::uint32_t> SliceEncoder::palette() const {

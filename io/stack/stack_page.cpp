@@ -9,6 +9,7 @@
 #include <tbb/task_arena.h>
 
 #include "io/file/staged_output.h"
+#include "io/file/text_bytes.h"
 #include "io/stack/viewer_page.h"
 #include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/option_values.h"
@@ -327,8 +328,7 @@ void StackPage::finish(const std::filesystem::path& target) {
   page += "<script type=\"application/json\" id=\"stack\">" + description() + "</script>\n";
   page += viewer_page.substr(mark + data_mark.size());
   StagedOutput staged(target, StagedOutput::Kind::file);
-  writeFile(staged.path(), {reinterpret_cast<const std::uint8_t*>(page.data()), page.size()},
-            target);
+  writeFile(staged.path(), textBytes(page), target);
   staged.commit();
 }
 
