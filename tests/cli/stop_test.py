@@ -118,8 +118,12 @@ class Stopped(ProgramTest):
         subprocess.run(["rm", "-rf", *self.folder.glob("out*")], check=True)
 
     def stop(self, verb, number, seconds):
-        """Stops a run of `verb` with the signal after some time of work, on the first part that takes long enough."""
-        for radius in self.RADII:
+        """Stops a run of `verb` with the signal after some time of work, on the first part that takes long enough.
+
+        A run that is done before that even with the largest part is stopped sooner.
+        """
+        moments = [(radius, seconds) for radius in self.RADII] + [(self.RADII[-1], seconds / share) for share in (2, 4, 8)]
+        for radius, seconds in moments:
             arguments = tuple(map(str, RUNS[verb](radius)))
             for name in (f"{kind}{radius}{ending}" for kind, ending in (
                     ("part", ".stl"), ("surface", ".vdb"), ("solid", ".vdb"), ("coloured", ".vdb"), ("stack", ""), ("picture", ".png"), ("outjob", ""), ("job", ""))):
