@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 #include <utility>
 
 namespace vdbdither::test {
@@ -126,6 +127,19 @@ Mesh pulledApart(const Mesh& mesh, double gap_mm) {
     }
   }
   return loose;
+}
+
+Mesh randomTriangles(unsigned seed, int count) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 10);
+  Mesh mesh;
+  for (int i = 0; i < count; ++i) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (int corner = 0; corner < 3; ++corner)
+      mesh.vertices.emplace_back(uniform(random), uniform(random), uniform(random));
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  return mesh;
 }
 
 }  // namespace vdbdither::test

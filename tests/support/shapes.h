@@ -28,4 +28,7 @@ Mesh unshared(const Mesh& mesh);
 /// The same, with every triangle drawn towards its centroid: corners move by `gap_mm`.
 Mesh pulledApart(const Mesh& mesh, double gap_mm);
 
+/// Triangles with random corners in a cube from 0 to 10 mm, none of which share a corner.
+Mesh randomTriangles(unsigned seed, int count);
+
 }  // namespace vdbdither::test

@@ -8,11 +8,12 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
+#include <memory>
 #include <numeric>
 #include <tuple>
 #include <utility>
 
+#include "ops/kernels/mesh/box_tree.h"
 #include "ops/kernels/mesh/enclosure.h"
 #include "ops/kernels/mesh/hole_filling.h"
 #include "ops/kernels/mesh/mesh_edges.h"
@@ -242,45 +243,110 @@ std::vector<bool> boundParts(const Mesh& mesh, const std::vector<std::uint32_t>&
   return bound;
 }
 
+/// The parts of a mesh: triangles that are connected.
+class ConnectedParts {
+ public:
+  /// \param part  of every triangle
+  ConnectedParts(Mesh& mesh, const std::vector<std::uint32_t>& part) : mesh_(mesh) {
+    const std::size_t count = part.empty() ? 0 : *std::max_element(part.begin(), part.end()) + 1;
+    parts_.resize(count);
+    bounds_.resize(count);
+    for (std::uint32_t i = 0; i < part.size(); ++i) {
+      parts_[part[i]].triangles.push_back(i);
+      for (const std::uint32_t v : mesh.triangles[i]) bounds_[part[i]].expand(mesh.vertices[v]);
+    }
+    std::vector<std::uint32_t> all(count);
+    std::iota(all.begin(), all.end(), 0U);
+    tree_ = BoxTree(bounds_, std::move(all));
+  }
+
+  [[nodiscard]] std::size_t size() const { return parts_.size(); }
+
+  [[nodiscard]] double volumeOf(std::size_t part) const {
+    const Vec3d centre = bounds_[part].getCenter();
+    double volume = 0;
+    for (const std::uint32_t i : parts_[part].triangles)
+      volume += volumeFrom(centre, mesh_, mesh_.triangles[i]);
+    return volume;
+  }
+
+  /// Whether a place of the part lies inside of others: their winding number there is beyond ½.
+  bool isSurrounded(std::size_t part) {
+    const Triangle& first = mesh_.triangles[parts_[part].triangles.front()];
+    const Vec3d p =
+        (mesh_.vertices[first[0]] + mesh_.vertices[first[1]] + mesh_.vertices[first[2]]) / 3;
+    std::vector<std::uint32_t> around;
+    tree_.visit([&](const BoxTree::Box& box) { return box.isInside(bounds_[part]); },
+                [&](std::uint32_t other) {
+                  if (other != part) around.push_back(other);
+                  return true;
+                });
+    std::sort(around.begin(), around.end());
+    double number = 0;
+    for (const std::uint32_t other : around) number += closeNumber(other, p);
+    if (std::abs(std::abs(number) - 0.5) < 0.001 * static_cast<double>(around.size())) {
+      number = 0;
+      for (const std::uint32_t other : around) number += exactNumber(other, p);
+    }
+    return std::abs(number) > 0.5;
+  }
+
+  void turn(std::size_t part) {
+    for (const std::uint32_t i : parts_[part].triangles)
+      std::swap(mesh_.triangles[i][1], mesh_.triangles[i][2]);
+    parts_[part].winding.reset();
+  }
+
+ private:
+  /// The winding number of a part of many triangles, by groups of them.
+  struct GroupedWinding {
+    Mesh mesh;
+    WindingNumber number{mesh};
+    explicit GroupedWinding(Mesh own) : mesh(std::move(own)) {}
+  };
+  struct Part {
+    std::vector<std::uint32_t> triangles;
+    std::unique_ptr<GroupedWinding> winding;  ///< once it is asked for
+  };
+
+  [[nodiscard]] double exactNumber(std::uint32_t part, const Vec3d& p) const {
+    return windingOf(mesh_, parts_[part].triangles, p);
+  }
+
+  double closeNumber(std::uint32_t part, const Vec3d& p) {
+    constexpr std::size_t few = 64;
+    Part& own = parts_[part];
+    if (own.triangles.size() < few) return exactNumber(part, p);
+    if (!own.winding) {
+      Mesh alone;
+      for (const std::uint32_t i : own.triangles) {
+        const auto first = static_cast<std::uint32_t>(alone.vertices.size());
+        for (const std::uint32_t v : mesh_.triangles[i])
+          alone.vertices.push_back(mesh_.vertices[v]);
+        alone.triangles.push_back({first, first + 1, first + 2});
+      }
+      own.winding = std::make_unique<GroupedWinding>(std::move(alone));
+    }
+    return own.winding->number.closelyAt(p);
+  }
+
+  Mesh& mesh_;
+  std::vector<Part> parts_;
+  std::vector<BoxTree::Box> bounds_;
+  BoxTree tree_;
+};
+
 /// Turns the parts of negative volume that no other part surrounds.
 void turnInsideOut(Mesh& mesh, const std::vector<std::uint32_t>& part, MeshRepairs& repairs) {
-  struct Part {
-    double volume = 0;
-    openvdb::math::BBox<Vec3d> bounds;
-    std::vector<std::uint32_t> triangles;
-  };
-  std::vector<Part> parts(part.empty() ? 0 : *std::max_element(part.begin(), part.end()) + 1);
-  for (std::uint32_t i = 0; i < part.size(); ++i) {
-    Part& own = parts[part[i]];
-    own.triangles.push_back(i);
-    for (const std::uint32_t v : mesh.triangles[i]) own.bounds.expand(mesh.vertices[v]);
-  }
-  for (Part& own : parts) {
-    const Vec3d centre = own.bounds.getCenter();
-    for (const std::uint32_t i : own.triangles)
-      own.volume += volumeFrom(centre, mesh, mesh.triangles[i]);
-  }
-  const bool any =
-      std::any_of(parts.begin(), parts.end(), [](const Part& own) { return own.volume < 0; });
-  const std::vector<bool> bound =
-      any ? boundParts(mesh, part, parts.size()) : std::vector<bool>(parts.size(), false);
-  for (const Part& own : parts) {
-    if (!(own.volume < 0) || bound[static_cast<std::size_t>(&own - parts.data())]) continue;
-    const Triangle& first = mesh.triangles[own.triangles.front()];
-    const Vec3d p =
-        (mesh.vertices[first[0]] + mesh.vertices[first[1]] + mesh.vertices[first[2]]) / 3;
-    double around = 0;
-    for (const Part& other : parts) {
-      if (&other == &own || !other.bounds.isInside(own.bounds)) continue;
-      for (const std::uint32_t i : other.triangles)
-        around +=
-            solidAngle({mesh.vertices[mesh.triangles[i][0]], mesh.vertices[mesh.triangles[i][1]],
-                        mesh.vertices[mesh.triangles[i][2]]},
-                       p);
-    }
-    if (std::abs(around) > 2 * std::numbers::pi) continue;
-    for (const std::uint32_t i : own.triangles)
-      std::swap(mesh.triangles[i][1], mesh.triangles[i][2]);
+  ConnectedParts parts(mesh, part);
+  std::vector<std::size_t> negative;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    if (parts.volumeOf(i) < 0) negative.push_back(i);
+  if (negative.empty()) return;
+  const std::vector<bool> bound = boundParts(mesh, part, parts.size());
+  for (const std::size_t i : negative) {
+    if (bound[i] || parts.isSurrounded(i)) continue;
+    parts.turn(i);
     ++repairs.turned_parts;
   }
 }

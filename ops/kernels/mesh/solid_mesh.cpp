@@ -20,9 +20,10 @@ SolidMesh guessed(DerivedMesh given, const LooseTriangles& open, const SolidOpti
   if (options.before_guess) options.before_guess(guess.loose);
   WindingSurface surface = windingSurface(loose.mesh, options.progress);
   if (surface.mesh.triangles.empty())
-    throw DataError("the triangles enclose nothing: " + open.text() +
-                    ", and their winding number is above one half nowhere; join them in a mesh "
-                    "editor first");
+    throw DataError("the triangles enclose nothing: " + open.text() + ", and " +
+                    (surface.is_given_up ? "they are too tangled to guess the part"
+                                         : "their winding number is above one half nowhere") +
+                    "; join them in a mesh editor first");
   guess.cell_mm = surface.cell_mm;
   guess.turned = surface.turned;
   solid.report.guesses.push_back(guess);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -30,6 +31,8 @@ class WindingCell {
   WindingCell(const Mesh& mesh, const WindingNumber& winding, const openvdb::Vec3d& low,
               double edge_mm, const std::array<Corner, 8>& corners);
 
+  /// How many triangles are summed one by one.
+  [[nodiscard]] std::size_t nearTriangles() const { return near_.size(); }
   /// Returns the number at p. `mesh` must be the one that the cell was made for.
   [[nodiscard]] double at(const Mesh& mesh, const openvdb::Vec3d& p) const;
   /// Returns about the gradient at p, per mm.

@@ -9,15 +9,28 @@ namespace vdbdither {
 using openvdb::Coord;
 using openvdb::Vec3d;
 
-WindingCells::WindingCells(const Mesh& mesh, const openvdb::math::BBox<Vec3d>& bounds)
+WindingCells::WindingCells(const Mesh& mesh, const WindingNumber& winding,
+                           const openvdb::math::BBox<Vec3d>& bounds, int along_longest)
     : mesh_(mesh),
-      winding_(mesh),
+      winding_(winding),
       longest_mm_(bounds.extents()[static_cast<int>(bounds.maxExtent())]),
       unit_mm_(longest_mm_ / along_longest / units),
       // Offsets that keep corners out of the planes that designs often use.
       origin_mm_(bounds.min() - units * unit_mm_ * Vec3d(0.3819, 0.4142, 0.3028)),
       limits_(Coord::floor((bounds.min() - 0.5 * longest_mm_ - origin_mm_) / unit_mm_),
               Coord::ceil((bounds.max() + 0.5 * longest_mm_ - origin_mm_) / unit_mm_)) {}
+
+std::size_t WindingCells::workOfMaking(std::span<const Coord> lows) const {
+  constexpr std::size_t sampled = 256;
+  // A corner is shared by up to eight cells, and has a number and a gradient of all triangles and
+  // of those near each cell.
+  constexpr std::size_t looks_per_cell = 4;
+  const std::size_t stride = (lows.size() + sampled - 1) / sampled;
+  std::size_t work = 0;
+  for (std::size_t i = 0; i < lows.size(); i += stride)
+    work += stride * looks_per_cell * winding_.workAt(position(lows[i]));
+  return work;
+}
 
 std::vector<std::uint32_t> WindingCells::at(const std::vector<Coord>& lows) {
   const auto cornerOf = [](const Coord& low, unsigned corner) {

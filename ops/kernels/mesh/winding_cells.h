@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <openvdb/Types.h>
@@ -14,18 +16,23 @@
 
 namespace vdbdither {
 
-/// The generalized winding number of a mesh in a grid of cells, 64 along the longest side of its
-/// bounding box. Places on the grid are counted in units; the edge of a cell is `units` long.
+/// The generalized winding number of a mesh in a grid of cells. Places on the grid are counted in
+/// units; the edge of a cell is `units` long.
 class WindingCells {
  public:
-  static constexpr double along_longest = 64;
   static constexpr int units = 32;
 
-  /// The mesh must outlive the cells; `bounds` is its bounding box.
-  WindingCells(const Mesh& mesh, const openvdb::math::BBox<openvdb::Vec3d>& bounds);
+  /// \param mesh           must outlive the cells
+  /// \param winding        of the mesh; must outlive the cells
+  /// \param bounds         bounding box of the mesh
+  /// \param along_longest  how many cells there are along the longest side of the box
+  WindingCells(const Mesh& mesh, const WindingNumber& winding,
+               const openvdb::math::BBox<openvdb::Vec3d>& bounds, int along_longest);
 
   /// Returns the cells with these lowest corners, which it makes if they do not exist.
   std::vector<std::uint32_t> at(const std::vector<openvdb::Coord>& lows);
+  /// About how many triangles `at` looks at to make cells, estimated from some of them.
+  [[nodiscard]] std::size_t workOfMaking(std::span<const openvdb::Coord> lows) const;
 
   /// Returns the number at a place in a cell.
   [[nodiscard]] double numberAt(std::uint32_t cell, const openvdb::Vec3d& p) const {
@@ -33,9 +40,14 @@ class WindingCells {
   }
   /// Returns a number on the right side of ½ and −½.
   [[nodiscard]] double judgedAt(std::uint32_t cell, const openvdb::Vec3d& p) const {
-    constexpr double doubt = 1e-3;
     const double number = numberAt(cell, p);
-    return std::abs(std::abs(number) - 0.5) < doubt ? winding_.judgedAt(p) : number;
+    return isDoubtful(number) ? winding_.judgedAt(p) : number;
+  }
+  /// About how many triangles `judgedAt` looks at to return a number in a cell.
+  [[nodiscard]] std::size_t workOfJudging(std::uint32_t cell, double number) const {
+    constexpr std::size_t of_far_triangles = 8;
+    return cells_[cell].nearTriangles() + of_far_triangles +
+           (isDoubtful(number) ? mesh_.triangles.size() : 0);
   }
   /// Returns about the gradient at a place in a cell, per mm.
   [[nodiscard]] openvdb::Vec3d gradientAt(std::uint32_t cell, const openvdb::Vec3d& p) const {
@@ -52,8 +64,13 @@ class WindingCells {
   [[nodiscard]] const openvdb::CoordBBox& limits() const { return limits_; }
 
  private:
+  [[nodiscard]] static bool isDoubtful(double number) {
+    constexpr double doubt = 1e-3;
+    return std::abs(std::abs(number) - 0.5) < doubt;
+  }
+
   const Mesh& mesh_;
-  WindingNumber winding_;
+  const WindingNumber& winding_;
   double longest_mm_, unit_mm_;
   openvdb::Vec3d origin_mm_;
   openvdb::CoordBBox limits_;

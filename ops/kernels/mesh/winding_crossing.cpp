@@ -63,7 +63,9 @@ std::vector<Pierced> piercedBy(const Mesh& mesh, const LeafEdge& edge) {
   return pierced;
 }
 
-std::vector<Pass> passesOf(const WindingSolid& solid, const LeafEdge& edge, const Vec3d& along) {
+/// \param looks  counts the places where the number is found
+std::vector<Pass> passesOf(const WindingSolid& solid, const LeafEdge& edge, const Vec3d& along,
+                           std::uint32_t& looks) {
   std::vector<Pass> passes;
   const auto add = [&](const Pass& next) {
     // Two that are so near enclose no wall and no gap.
@@ -81,6 +83,7 @@ std::vector<Pass> passesOf(const WindingSolid& solid, const LeafEdge& edge, cons
   bool last = edge.low_is_inside;
   for (const Pierced& pierced : piercedBy(solid.cells().mesh(), edge)) {
     const double t = pierced.t;
+    ++looks;
     // Across a triangle the number jumps by one.
     const double number = solid.judgedAt(edge.cell, edge.from + along * (t - beside));
     const bool before = number > 0.5;
@@ -98,8 +101,9 @@ std::vector<Pass> passesOf(const WindingSolid& solid, const LeafEdge& edge, cons
 /// Where the number passes ½ on a stretch that no triangle cuts: regula falsi, which halves the
 /// weight of an end that stays (Illinois).
 double smoothCrossing(const WindingSolid& solid, const LeafEdge& edge, const Vec3d& along,
-                      double low, double high) {
+                      double low, double high, std::uint32_t& looks) {
   const auto above = [&](double t) {
+    ++looks;
     return solid.numberAt(edge.cell, edge.from + along * t) - 0.5;
   };
   double at_low = above(low);
@@ -138,15 +142,16 @@ Vec3d LeafCube::within(Vec3d p) const {
 EdgeCrossing crossingOf(const WindingSolid& solid, const LeafEdge& edge) {
   Vec3d along(0.0);
   along[edge.axis] = edge.size_mm;
-  const std::vector<Pass> passes = passesOf(solid, edge, along);
   EdgeCrossing crossing;
+  const std::vector<Pass> passes = passesOf(solid, edge, along, crossing.looks);
   if (passes.empty()) return crossing;
   crossing.passes = static_cast<std::uint8_t>(std::min<std::size_t>(passes.size(), 2));
   const Pass& first = passes.front();
   crossing.triangle = first.triangle;
   crossing.is_smooth = first.high > first.low;
-  const double t =
-      crossing.is_smooth ? smoothCrossing(solid, edge, along, first.low, first.high) : first.low;
+  const double t = crossing.is_smooth
+                       ? smoothCrossing(solid, edge, along, first.low, first.high, crossing.looks)
+                       : first.low;
   crossing.at = edge.from + along * std::clamp(t, clearance, 1 - clearance);
   crossing.normal = crossing.is_smooth
                         ? solid.cells().gradientAt(edge.cell, edge.from + along * t).unitSafe()

@@ -48,6 +48,7 @@ struct EdgeCrossing {
   std::uint32_t triangle = no_source;  ///< that the edge pierces there; no_source between triangles
   std::uint8_t passes = 0;  ///< 0 for an edge that does not cross it, 2 for several crossings
   bool is_smooth = false;   ///< between triangles, where the number is ½
+  std::uint32_t looks = 0;  ///< at how many places the number was found
 };
 
 /// An edge of a leaf, and what is known of it.

@@ -241,6 +241,14 @@ void WindingNumber::forEach(const Vec3d& p, double far_radii, const Far& far,
   }
 }
 
+std::size_t WindingNumber::workAt(const Vec3d& p) const {
+  std::size_t work = 0;
+  forEach(
+      p, close_radii, [&work](const Node&, const Vec3d&) { ++work; },
+      [&work](const Node& node) { work += node.end - node.begin; });
+  return work;
+}
+
 /// A group adds the field of a dipole, a·r / r³ with r from the point to the group's centre, and
 /// its first and second derivatives, contracted with the moments.
 double WindingNumber::sum(const Vec3d& p, double far_radii) const {

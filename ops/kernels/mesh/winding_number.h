@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -48,6 +49,9 @@ class WindingNumber {
 
   /// Returns the number to within 0.0005, mostly within 0.0001.
   [[nodiscard]] double closelyAt(const openvdb::Vec3d& p) const { return sum(p, close_radii); }
+
+  /// How many triangles and groups `closelyAt` looks at.
+  [[nodiscard]] std::size_t workAt(const openvdb::Vec3d& p) const;
 
   /// Returns the gradient at p per mm, mostly to within some thousandths. `p` must not lie on a
   /// side of a triangle.

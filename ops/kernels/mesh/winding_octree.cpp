@@ -174,7 +174,8 @@ EdgeCrossing WindingOctree::crossing(const Edge& edge, const Leaf& leaf) const {
                              {touches_.data() + leaf.first, leaf.count}});
 }
 
-void WindingOctree::findCells(std::span<const std::uint32_t> fresh) {
+/// Finds the cells of roots. Returns false if that is too much work.
+bool WindingOctree::findCells(std::span<const std::uint32_t> fresh, std::size_t most_work) {
   std::vector<std::uint32_t> roots;
   std::vector<Coord> lows;
   for (const std::uint32_t leaf : fresh)
@@ -182,8 +183,11 @@ void WindingOctree::findCells(std::span<const std::uint32_t> fresh) {
       roots.push_back(leaf);
       lows.push_back(leaves_[leaf].low);
     }
+  work_ += cells_.workOfMaking(lows);
+  if (work_ > most_work) return false;
   const std::vector<std::uint32_t> cells = cells_.at(lows);
   for (std::size_t i = 0; i < cells.size(); ++i) leaves_[roots[i]].cell = cells[i];
+  return true;
 }
 
 /// Finds the corners of the leaves that are inside. Corners beyond the limits are outside.
@@ -198,13 +202,15 @@ void WindingOctree::judgeCorners(std::span<const std::uint32_t> fresh,
   eraseAll(corners, [this](const auto& corner) {
     return !cells_.limits().isInside(coordOf(corner.first)) || inside_.contains(corner.first);
   });
-  std::vector<char> inside(corners.size(), 0);
+  std::vector<double> numbers(corners.size());
   forAll(corners.size(), progress, [&](std::size_t i) {
     const auto& [key, leaf] = corners[i];
-    const double number = solid_.judgedAt(leaves_[leaf].cell, cells_.position(coordOf(key)));
-    inside[i] = number > 0.5 ? 1 : 0;
+    numbers[i] = solid_.judgedAt(leaves_[leaf].cell, cells_.position(coordOf(key)));
   });
-  for (std::size_t i = 0; i < corners.size(); ++i) inside_.add(corners[i].first, inside[i] != 0);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    inside_.add(corners[i].first, numbers[i] > 0.5);
+    work_ += cells_.workOfJudging(leaves_[corners[i].second].cell, numbers[i]);
+  }
   forAll(fresh.size(),
          [&](std::size_t i) { leaves_[fresh[i]].inside = insideOf(leaves_[fresh[i]]); });
 }
@@ -223,15 +229,20 @@ void WindingOctree::findCrossings(std::span<const std::uint32_t> fresh,
   forAll(edges.size(), progress, [&](std::size_t i) {
     crossings[i] = crossing(edgeOf(edges[i].first), leaves_[edges[i].second]);
   });
-  for (std::size_t i = 0; i < edges.size(); ++i)
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const Leaf& leaf = leaves_[edges[i].second];
+    work_ += leaf.count + crossings[i].looks * cells_.workOfJudging(leaf.cell, 0);
     if (crossings[i].passes > 0) {
       crossing_at_.add(edges[i].first, static_cast<std::uint32_t>(crossings_.size()));
       crossings_.push_back(crossings[i]);
     }
+  }
 }
 
 /// Adds the cells across cut edges and divides the leaves that need it. Returns the new leaves.
-std::vector<std::uint32_t> WindingOctree::spread(std::span<const std::uint32_t> fresh) {
+/// \param work_of_fresh  that the leaves `fresh` took
+std::vector<std::uint32_t> WindingOctree::spread(std::span<const std::uint32_t> fresh,
+                                                 std::size_t work_of_fresh) {
   std::vector<char> divided(fresh.size(), 0);
   forAll(fresh.size(), [&](std::size_t i) {
     const Leaf& leaf = leaves_[fresh[i]];
@@ -239,7 +250,9 @@ std::vector<std::uint32_t> WindingOctree::spread(std::span<const std::uint32_t> 
   });
   // Where there are too many, small leaves stay, so that leaves found late are divided as well.
   const auto dividing = static_cast<std::size_t>(std::count(divided.begin(), divided.end(), 1));
-  if (leaves_.size() + 8 * dividing > max_leaves_) smallest_ = std::max(smallest_, smallest_made_);
+  const std::size_t work_of_parts = 8 * dividing * (work_of_fresh / fresh.size());
+  if (leaves_.size() + 8 * dividing > max_leaves_ || work_ + work_of_parts > max_work_)
+    smallest_ = std::max(smallest_, smallest_made_);
   std::vector<std::uint32_t> grown;
   for (std::size_t i = 0; i < fresh.size(); ++i) {
     const Leaf leaf = leaves_[fresh[i]];
@@ -258,7 +271,7 @@ std::vector<std::uint32_t> WindingOctree::spread(std::span<const std::uint32_t> 
   return grown;
 }
 
-void WindingOctree::grow(const ProgressPart& progress) {
+bool WindingOctree::grow(const ProgressPart& progress, std::size_t most_work) {
   addTouched();
   std::vector<std::uint32_t> fresh(leaves_.size());
   std::iota(fresh.begin(), fresh.end(), 0U);
@@ -267,12 +280,14 @@ void WindingOctree::grow(const ProgressPart& progress) {
     // The number of rounds is unknown: each counts as a quarter of what is left.
     const double next = done + 0.25 * (1 - done);
     const double middle = 0.5 * (done + next);
-    findCells(fresh);
+    if (!findCells(fresh, most_work)) return false;
+    const std::size_t before = work_;
     judgeCorners(fresh, progress.part(done, middle));
     findCrossings(fresh, progress.part(middle, next));
     done = next;
-    fresh = spread(fresh);
+    fresh = spread(fresh, work_ - before);
   }
+  return true;
 }
 
 /// Whether one vertex cannot represent the surface in the leaf.

@@ -42,17 +42,24 @@ class WindingOctree {
     int size;
   };
 
-  /// Cells are divided up to `cuts` times, into at most about `max_leaves`.
-  WindingOctree(const WindingSolid& solid, int cuts, std::size_t max_leaves)
+  /// \param cuts        how often a cell may be divided
+  /// \param max_leaves  no more are made by dividing
+  /// \param max_work    no cell is divided if that is more work; in triangles looked at, as
+  ///                    WindingCells counts them
+  WindingOctree(const WindingSolid& solid, int cuts, std::size_t max_leaves, std::size_t max_work)
       : solid_(solid),
         cells_(solid.cells()),
         mesh_(cells_.mesh()),
         unit_mm_(cells_.unitMm()),
         smallest_(root_units >> cuts),
-        max_leaves_(max_leaves) {}
+        max_leaves_(max_leaves),
+        max_work_(max_work) {}
 
-  /// Finds the leaves; must be called once, before all else.
-  void grow(const ProgressPart& progress);
+  static constexpr std::size_t unlimited = ~std::size_t{0};
+
+  /// Finds the leaves; must be called once, before all else. Returns false if it gave up, because
+  /// it is more work than `most_work`.
+  bool grow(const ProgressPart& progress, std::size_t most_work = unlimited);
 
   /// All leaves, the divided ones included.
   [[nodiscard]] const std::vector<Leaf>& leaves() const { return leaves_; }
@@ -109,10 +116,11 @@ class WindingOctree {
   void addTouched();
   std::uint32_t add(const openvdb::Coord& low, int size);
   void divide(std::uint32_t leaf, std::vector<std::uint32_t>& fresh);
-  void findCells(std::span<const std::uint32_t> fresh);
+  bool findCells(std::span<const std::uint32_t> fresh, std::size_t most_work);
   void judgeCorners(std::span<const std::uint32_t> fresh, const ProgressPart& progress);
   void findCrossings(std::span<const std::uint32_t> fresh, const ProgressPart& progress);
-  std::vector<std::uint32_t> spread(std::span<const std::uint32_t> fresh);
+  std::vector<std::uint32_t> spread(std::span<const std::uint32_t> fresh,
+                                    std::size_t work_of_fresh);
 
   WindingSolid solid_;
   WindingCells& cells_;
@@ -120,6 +128,8 @@ class WindingOctree {
   double unit_mm_;
   int smallest_;  ///< that leaves may become
   std::size_t max_leaves_;
+  std::size_t max_work_;
+  std::size_t work_ = 0;
   std::vector<Leaf> leaves_;
   KeyMap<std::uint32_t> leaf_at_;
   std::vector<std::uint32_t> touches_;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/progress_part.h"
 #include "ops/kernels/mesh/winding_cells.h"
+#include "ops/kernels/mesh/winding_number.h"
 #include "ops/kernels/mesh/winding_octree.h"
 
 namespace vdbdither {
@@ -22,6 +24,27 @@ namespace vdbdither {
 using openvdb::Vec3d;
 
 namespace {
+
+/// Cells along the longest side of the triangles' bounding box.
+constexpr int most_along_longest = 64;
+constexpr int least_along_longest = 16;
+/// How many triangles may be looked at, at 20 to 40 ns each: to find cells, and then to divide them.
+constexpr std::size_t least_work = 40'000'000;
+constexpr std::size_t work_per_triangle = 1500;
+constexpr double most_touches = 1e7;
+
+/// About how many cells the triangles meet, a cell counted for each of them.
+double touches(const Mesh& mesh, const openvdb::math::BBox<Vec3d>& bounds, int along_longest) {
+  const double cell_mm = bounds.extents()[static_cast<int>(bounds.maxExtent())] / along_longest;
+  double sum = 0;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto [a, b, c] = cornersOf(mesh, t);
+    const double around_mm = (b - a).length() + (c - b).length() + (a - c).length();
+    const double area_mm2 = 0.5 * (b - a).cross(c - a).length();
+    sum += 1 + around_mm / cell_mm + 1.5 * area_mm2 / (cell_mm * cell_mm);
+  }
+  return sum;
+}
 
 /// A cut edge that no smaller leaf lies beside, and the leaves around it.
 struct CutEdge {
@@ -107,19 +130,31 @@ WindingSurface windingSurface(const Mesh& triangles, const std::function<void(do
   if (bounds.empty() || !(bounds.extents().length() > 0)) return made;
 
   const ProgressPart whole(progress);
-  WindingCells cells(triangles, bounds);
-  const auto volume = [&](double side, const ProgressPart& part) {
-    WindingOctree coarse(WindingSolid(cells, side), 0, 0);
-    coarse.grow(part);
-    return volumeOf(surfaceOf(coarse).mesh);
-  };
-  const double outwards = volume(1, whole.part(0, 0.05));
-  made.turned = volume(-1, whole.part(0.05, 0.1)) > 2 * outwards;
-  WindingOctree fine(WindingSolid(cells, made.turned ? -1 : 1), WindingOctree::max_cuts,
-                     max_leaves);
-  fine.grow(whole.part(0.1, 1));
-  made.cell_mm = fine.smallestMm();
-  static_cast<DerivedMesh&>(made) = surfaceOf(fine);
+  const WindingNumber winding(triangles);
+  const std::size_t most_work =
+      std::max(least_work, work_per_triangle * triangles.triangles.size());
+  for (int along_longest = most_along_longest; along_longest >= least_along_longest;
+       along_longest /= 2) {
+    if (touches(triangles, bounds, along_longest) > most_touches) continue;
+    WindingCells cells(triangles, winding, bounds, along_longest);
+    const auto volume = [&](double side, const ProgressPart& part) -> std::optional<double> {
+      WindingOctree coarse(WindingSolid(cells, side), 0, 0, 0);
+      if (!coarse.grow(part, most_work)) return {};
+      return volumeOf(surfaceOf(coarse).mesh);
+    };
+    const std::optional<double> outwards = volume(1, whole.part(0, 0.05));
+    if (!outwards) continue;
+    const std::optional<double> inwards = volume(-1, whole.part(0.05, 0.1));
+    if (!inwards) continue;
+    made.turned = *inwards > 2 * *outwards;
+    WindingOctree fine(WindingSolid(cells, made.turned ? -1 : 1), WindingOctree::max_cuts,
+                       max_leaves, 3 * most_work);
+    fine.grow(whole.part(0.1, 1));
+    made.cell_mm = fine.smallestMm();
+    static_cast<DerivedMesh&>(made) = surfaceOf(fine);
+    return made;
+  }
+  made.is_given_up = true;
   return made;
 }
 

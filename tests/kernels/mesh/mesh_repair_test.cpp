@@ -87,6 +87,25 @@ TEST(MeshRepair, CavitiesStayCavities) {
   EXPECT_EQ(repairs.turned_parts, 0U);
 }
 
+TEST(MeshRepair, AnIslandInACavityIsTurned) {
+  const Mesh hollow =
+      joined({sphereMesh({0, 0, 0}, 2, 8), insideOut(sphereMesh({0.1, 0, 0}, 1.5, 8))});
+  const Mesh island = sphereMesh({0.2, 0, 0}, 0.5, 4);
+  MeshRepairs repairs;
+  EXPECT_NEAR(volumeOf(repaired(joined({hollow, insideOut(island)}), repairs)),
+              volumeOf(hollow) + volumeOf(island), 1e-12);
+  EXPECT_EQ(repairs.turned_parts, 1U);
+}
+
+TEST(MeshRepair, PartsThatWereTurnedSurroundTheirCavities) {
+  const Mesh shell = sphereMesh({0, 0, 0}, 2, 12);
+  const Mesh cavity = sphereMesh({0.3, 0.2, 0}, 1, 8);
+  MeshRepairs repairs;
+  EXPECT_NEAR(volumeOf(repaired(joined({insideOut(shell), insideOut(cavity)}), repairs)),
+              volumeOf(shell) - volumeOf(cavity), 1e-12);
+  EXPECT_EQ(repairs.turned_parts, 1U);
+}
+
 TEST(MeshRepair, FillsHoles) {
   Mesh mesh = sphereMesh({0, 0, 0}, 1, 12);
   const double whole = volumeOf(mesh);

@@ -25,6 +25,7 @@ using test::sphereMesh;
 using testing::Each;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::ThrowsMessage;
 
 std::vector<std::uint32_t> countedFrom(std::uint32_t first, std::size_t count) {
   std::vector<std::uint32_t> indices(count);
@@ -191,6 +192,13 @@ TEST(SolidMesh, RefusesTrianglesThatEncloseNothing) {
                 HasSubstr("the triangles enclose nothing: 3 of their 3 sides meet no "
                           "other, and their winding number is above one half nowhere"));
   }
+}
+
+TEST(SolidMesh, RefusesTrianglesThatAreTooTangledToGuess) {
+  EXPECT_THAT([] { solidMesh(test::randomTriangles(3, 6000)); },
+              ThrowsMessage<DataError>(
+                  "the triangles enclose nothing: 18000 of their 18000 sides meet no other, and "
+                  "they are too tangled to guess the part; join them in a mesh editor first"));
 }
 
 TEST(SolidMesh, TrianglesThatCancelLeaveAnEmptyMesh) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "ops/kernels/mesh/winding_number.h"
 #include "tests/support/shapes.h"
 
 namespace vdbdither {
@@ -16,7 +17,8 @@ class WindingCrossing : public testing::Test {
  protected:
   explicit WindingCrossing(Mesh mesh = test::boxMesh(Vec3d(0.0), Vec3d(10.0)))
       : mesh_(std::move(mesh)),
-        cells_(mesh_, {Vec3d(0.0), Vec3d(10.0)}),
+        number_(mesh_),
+        cells_(mesh_, number_, {Vec3d(0.0), Vec3d(10.0)}, 64),
         all_(mesh_.triangles.size()) {
     std::iota(all_.begin(), all_.end(), 0U);
   }
@@ -33,6 +35,7 @@ class WindingCrossing : public testing::Test {
   }
 
   Mesh mesh_;
+  WindingNumber number_;
   WindingCells cells_;
   std::vector<std::uint32_t> all_;
 };

@@ -19,19 +19,6 @@ using openvdb::Vec3d;
 
 constexpr std::size_t few_leaves = 60'000;
 
-Mesh randomTriangles(unsigned seed, int count) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> uniform(0, 10);
-  Mesh mesh;
-  for (int i = 0; i < count; ++i) {
-    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-    for (int corner = 0; corner < 3; ++corner)
-      mesh.vertices.emplace_back(uniform(random), uniform(random), uniform(random));
-    mesh.triangles.push_back({first, first + 1, first + 2});
-  }
-  return mesh;
-}
-
 /// Of so many random points about the mesh, those that are on another side of the made surface than
 /// the exact number says, as a share of those inside.
 double shareOfWrongSides(const Mesh& loose, const Mesh& made, int points, double side = 1) {
@@ -93,7 +80,7 @@ TEST(WindingSurface, KeepsWallsThinnerThanACoarseCell) {
 
 TEST(WindingSurface, PartsTrianglesOfAnyPlaceAsTheirNumberDoes) {
   for (const unsigned seed : {1U, 2U}) {
-    const Mesh loose = randomTriangles(seed, 24);
+    const Mesh loose = test::randomTriangles(seed, 24);
     const WindingSurface surface = windingSurface(loose, {}, 200'000);
     EXPECT_EQ(test::openSides(surface.mesh), 0U);
     EXPECT_LT(shareOfWrongSides(loose, surface.mesh, 20'000, surface.turned ? -1 : 1), 0.01);
@@ -134,13 +121,20 @@ TEST(WindingSurface, TrianglesThatEncloseNothingHaveNone) {
 }
 
 TEST(WindingSurface, IsTheSameForAnyNumberOfThreads) {
-  const Mesh loose = randomTriangles(3, 30);
+  const Mesh loose = test::randomTriangles(3, 30);
   const WindingSurface all = windingSurface(loose, {}, few_leaves);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   const WindingSurface alone = windingSurface(loose, {}, few_leaves);
   EXPECT_EQ(all.mesh.vertices, alone.mesh.vertices);
   EXPECT_EQ(all.mesh.triangles, alone.mesh.triangles);
   EXPECT_GT(all.mesh.triangles.size(), 1000U);
+}
+
+TEST(WindingSurface, TangledTrianglesGetLargerCells) {
+  const WindingSurface few = windingSurface(test::randomTriangles(3, 30), {}, few_leaves);
+  const WindingSurface many = windingSurface(test::randomTriangles(3, 600), {}, few_leaves);
+  ASSERT_FALSE(many.mesh.triangles.empty());
+  EXPECT_GE(many.cell_mm, 2 * few.cell_mm);
 }
 
 TEST(WindingSurface, TellsHowFarItIs) {
@@ -158,20 +152,9 @@ TEST(WindingSurface, TellsHowFarItIs) {
 
 TEST(WindingSurface, ASignalEndsTheGuess) {
   testing::GTEST_FLAG(death_test_style) = "threadsafe";
-  // Triangles of any direction take all cells, which are many seconds of work.
-  EXPECT_EXIT(test::endByInterrupt(std::chrono::milliseconds(500),
-                                   [] {
-                                     std::mt19937 random(1);
-                                     std::uniform_real_distribution<double> place(0, 10);
-                                     Mesh soup;
-                                     for (std::uint32_t t = 0; t < 300; ++t) {
-                                       for (int corner = 0; corner < 3; ++corner)
-                                         soup.vertices.emplace_back(place(random), place(random),
-                                                                    place(random));
-                                       soup.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
-                                     }
-                                     windingSurface(soup);
-                                   }),
+  // Triangles of any direction take all cells, which are seconds of work.
+  EXPECT_EXIT(test::endByInterrupt(std::chrono::milliseconds(100),
+                                   [] { windingSurface(test::randomTriangles(1, 300)); }),
               testing::ExitedWithCode(0), "");
 }
 
