@@ -5,6 +5,7 @@
 
 #include "io/job/open_job.h"
 #include "io/job/piece_numbers.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/engine/pipeline.h"
 #include "vdbdither/engine/tool.h"
 #include "vdbdither/engine/tool_watcher.h"
@@ -19,6 +20,7 @@ class Merge : public Tool {
  public:
   void declare(Options& options) override {
     options.positional("job", folder_, "Folder of the job");
+    overwrite_.declare(options, "each output");
   }
 
   void run() override {
@@ -27,7 +29,7 @@ class Merge : public Tool {
     checkInputs(opened.job());
     ToolWatcher watcher(report());
     watcher.expect(share_of_check, 1 - share_of_check);
-    Pipeline pipeline(opened.steps({}));
+    Pipeline pipeline(overwrite_.overwrite ? opened.stepsThatOverwrite() : opened.steps({}));
     const JobPlan& plan = pipeline.plan(watcher);
     opened.checkLattice(plan);
     std::vector<Piece> pieces;
@@ -64,6 +66,7 @@ class Merge : public Tool {
   }
 
   std::string folder_;
+  OverwriteOption overwrite_;
 };
 
 }  // namespace

@@ -18,9 +18,16 @@ struct FilesRead {
   }
 };
 
+thread_local int unnoted = 0;
+
 }  // namespace
 
+ReadsUnnoted::ReadsUnnoted() { ++unnoted; }
+
+ReadsUnnoted::~ReadsUnnoted() { --unnoted; }
+
 void noteFileRead(const std::filesystem::path& path) {
+  if (unnoted > 0) return;
   FilesRead& files = FilesRead::all();
   const std::lock_guard lock(files.mutex);
   files.paths.insert(path.lexically_normal());

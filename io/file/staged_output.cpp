@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "io/file/file_name.h"
+#include "io/file/files_read.h"
 #include "io/file/staging_name.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
@@ -322,6 +323,7 @@ void StagedOutput::checkFolder(const fs::path& given, bool overwrite, const OwnF
   check(given, Kind::folder, overwrite);
   std::error_code none;
   if (!isThere(target) || fs::is_empty(target, none)) return;
+  const ReadsUnnoted of_old_output;
   const fs::path foreign = foreignIn(target, own(target));
   if (!foreign.empty()) {
     throw UsageError(quoted(given) + " holds " + quoted(foreign) +

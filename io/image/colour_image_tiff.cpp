@@ -117,6 +117,8 @@ ColourImage decodeTiffImage(std::span<const std::uint8_t> bytes, const SizeCheck
     throw DataError("is a TIFF of too many samples a pixel; save it as RGB");
   if (!isPackedInAKnownWay(head))
     throw DataError("is a TIFF packed in a way that is not read; save it with LZW or deflate");
+  if (head.packing == COMPRESSION_JPEG)
+    throw DataError("is a TIFF packed as JPEG, which changes pixels; save it with LZW or deflate");
   if (head.orientation != ORIENTATION_TOPLEFT)
     throw DataError("is a TIFF that does not begin at the top left; save it again without a turn");
   if (isOfOneBit(head) && TIFFIsTiled(tiff.get()) == 0)

@@ -242,16 +242,22 @@ fs::path pieceFolder(const fs::path& job_folder, std::size_t number) {
 }
 
 std::vector<JobInput> inputsRead(const std::vector<std::string>& outputs) {
-  std::vector<fs::path> left_out(outputs.begin(), outputs.end());
-  if (const auto masks = maskCacheFolder()) left_out.push_back(*masks);
+  const auto masks = maskCacheFolder();
+  const auto isAtOrBelow = [](const fs::path& path, const fs::path& file) {
+    const fs::path whole = fs::weakly_canonical(fs::absolute(path));
+    const fs::path part = fs::weakly_canonical(fs::absolute(file));
+    return whole == part || below(whole, part).has_value();
+  };
   std::vector<JobInput> inputs;
   for (const fs::path& file : filesRead()) {
-    const bool is_left_out =
-        std::any_of(left_out.begin(), left_out.end(), [&](const fs::path& path) {
-          return below(path, file).has_value() ||
-                 fs::absolute(path).lexically_normal() == fs::absolute(file).lexically_normal();
-        });
-    if (!is_left_out) inputs.push_back(inputOf(file));
+    if (masks && isAtOrBelow(*masks, file)) continue;
+    for (const std::string& output : outputs) {
+      if (!isAtOrBelow(output, file)) continue;
+      throw UsageError("the chain reads '" + file.string() + "' and writes '" + output +
+                       "', so that pieces would read what the merge has written; give the output "
+                       "another name");
+    }
+    inputs.push_back(inputOf(file));
   }
   return inputs;
 }
@@ -263,6 +269,12 @@ void checkInputs(const Job& job) {
     if (!file) {
       throw DataError("the data file '" + input.file +
                       "' of the job is not installed here; install the same version everywhere");
+    }
+    std::error_code none;
+    if (!fs::exists(*file, none)) {
+      throw DataError("there is no '" + fs::absolute(*file).lexically_normal().string() +
+                      "', which the job reads; a job that is moved takes its inputs along, at the "
+                      "same places beside it");
     }
     if (digestOfFile(*file) != input.digest) {
       throw DataError("'" + file->string() +

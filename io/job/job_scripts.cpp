@@ -73,7 +73,9 @@ std::string sbatch(const Job& job) {
        << "  exec vdbdither piece . \"$SLURM_ARRAY_TASK_ID\" --threads \"$SLURM_CPUS_PER_TASK\"\n"
        << "  ;;\n"
        << "merge)\n"
-       << "  exec vdbdither merge . --threads \"$SLURM_CPUS_PER_TASK\"\n"
+       << "  # A merge that is queued again may have published some of its outputs.\n"
+       << "  exec vdbdither merge . ${SLURM_RESTART_COUNT:+--overwrite} --threads "
+          "\"$SLURM_CPUS_PER_TASK\"\n"
        << "  ;;\n"
        << "submit)\n"
        << "  array=$(VDBDITHER_STEP=piece sbatch --parsable --array=0-" << last

@@ -1,7 +1,10 @@
 #include "io/job/open_job.h"
 
+#include <algorithm>
 #include <system_error>
 
+#include "vdbdither/engine/operator.h"
+#include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -24,6 +27,25 @@ std::vector<Step> OpenJob::steps(const std::vector<std::string>& options) const 
   std::vector<Step> steps = parseChain(job_.chain);
   std::vector<std::string>& first = steps.front().arguments;
   first.insert(first.begin(), options.begin(), options.end());
+  return steps;
+}
+
+std::vector<Step> OpenJob::stepsThatOverwrite() const {
+  const std::string option = "--overwrite";
+  std::vector<Step> steps = parseChain(job_.chain);
+  const auto add = [&](Step& step) {
+    std::vector<std::string>& arguments = step.arguments;
+    if (std::find(arguments.begin(), arguments.end(), option) == arguments.end())
+      arguments.push_back(option);
+  };
+  const auto isSink = [](const Step& step) {
+    return dynamic_cast<const Sink*>(findOperator(step.verb).make().get()) != nullptr;
+  };
+  for (Step& step : steps) {
+    if (isSink(step)) add(step);
+  }
+  // The run itself writes what the last operator makes.
+  if (!isSink(steps.back())) add(steps.back());
   return steps;
 }
 

@@ -28,6 +28,9 @@ class OpenJob {
   /// The chain, with `options` of a run before those that it gives itself.
   [[nodiscard]] std::vector<Step> steps(const std::vector<std::string>& options) const;
 
+  /// The chain, with every output replaced if it is there.
+  [[nodiscard]] std::vector<Step> stepsThatOverwrite() const;
+
   /// Throws DataError unless `plan`, of all layers or some, is of the lattice that the job was cut
   /// on.
   void checkLattice(const JobPlan& plan) const;

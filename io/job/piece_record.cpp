@@ -72,6 +72,12 @@ std::optional<Record> readRecord(const fs::path& folder) {
   }
 }
 
+/// Whether file servers and desktops leave files of this name in any folder.
+bool isOfFileBrowser(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return name.starts_with('.') || name == "Thumbs.db" || name == "desktop.ini";
+}
+
 }  // namespace
 
 void writePieceRecord(const fs::path& folder, const PieceOf& piece) {
@@ -97,6 +103,9 @@ std::optional<std::string> pieceProblem(const fs::path& folder, const PieceOf& p
   for (const auto& [name, digest] : record->files) {
     if (!files.contains(name)) return "lacks its file '" + printable(name) + "'";
   }
+  std::erase_if(files, [&](const auto& file) {
+    return !record->files.contains(file.first) && isOfFileBrowser(file.first);
+  });
   for (const auto& [name, digest] : files) {
     if (!record->files.contains(name)) return "holds a foreign file '" + printable(name) + "'";
   }

@@ -17,6 +17,7 @@
 #include "io/mesh/gltf_materials.h"
 #include "io/mesh/gltf_primitive.h"
 #include "io/mesh/gltf_scene.h"
+#include "io/mesh/gltf_skin.h"
 #include "io/mesh/mesh_format.h"
 #include "io/mesh/part_names.h"
 #include "vdbdither/model/interrupt.h"
@@ -31,7 +32,7 @@ namespace {
 constexpr std::string_view glb_magic = "glTF";
 
 /// What is read, and what changes neither the shape nor the base colour.
-constexpr std::array<std::string_view, 21> known_extensions{
+constexpr std::array<std::string_view, 22> known_extensions{
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -48,6 +49,7 @@ constexpr std::array<std::string_view, 21> known_extensions{
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_basisu",  // refused where an image needs it
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
@@ -140,6 +142,7 @@ class GltfReader {
     const GltfScene scene = readGltfScene(root_);
     for (const GltfInstance& instance : scene.instances) load(instance.mesh);
     reserve(scene);
+    loadSkins(scene);
     for (const GltfInstance& instance : scene.instances) add(instance);
     if (mesh_.parts.size() < 2) mesh_.parts.clear();
     if (file_.wantsColours() && !is_plain_) {
@@ -205,16 +208,38 @@ class GltfReader {
     mesh_.parts.push_back({names_.unique(name), begin});
     for (const GltfPrimitive& primitive : primitives) {
       throwIfInterrupted();
-      addVertices(primitive, instance.to_world);
-      addTriangles(primitive, instance.to_world);
+      const GltfSkin* skin =
+          instance.skin && !primitive.bones.empty() ? &skins_.at(*instance.skin) : nullptr;
+      // The node of a mesh with bones does not place it.
+      const Mat4d to_world = skin != nullptr  ? skin->mapOf(primitive.bones.front())
+                             : !instance.skin ? instance.to_world
+                                              : Mat4d::identity();
+      boneless_ += instance.skin && skin == nullptr ? 1 : 0;
+      addVertices(primitive, to_world, skin);
+      addTriangles(primitive, to_world);
     }
   }
 
-  void addVertices(const GltfPrimitive& primitive, const Mat4d& to_world) {
+  /// Reads the skins of the meshes that are placed.
+  void loadSkins(const GltfScene& scene) {
+    for (const GltfInstance& instance : scene.instances) {
+      const Primitives& primitives = loaded_[instance.mesh];
+      const bool has_bones =
+          std::any_of(primitives.begin(), primitives.end(),
+                      [](const GltfPrimitive& primitive) { return !primitive.bones.empty(); });
+      if (!instance.skin || !has_bones || skins_.contains(*instance.skin)) continue;
+      skins_.emplace(*instance.skin, GltfSkin(root_["skins"].at(*instance.skin), scene.to_world,
+                                              primitives_.accessors()));
+    }
+  }
+
+  void addVertices(const GltfPrimitive& primitive, const Mat4d& to_world, const GltfSkin* skin) {
     constexpr double mm_per_m = 1000;
     first_vertex_ = static_cast<std::uint32_t>(mesh_.vertices.size());
-    const Mat4d m = to_world * mm_per_m;
-    for (const Vec3d& from : primitive.positions) {
+    Mat4d m = to_world * mm_per_m;
+    for (std::size_t i = 0; i < primitive.positions.size(); ++i) {
+      if (skin != nullptr) m = skin->mapOf(primitive.bones[i]) * mm_per_m;
+      const Vec3d& from = primitive.positions[i];
       Vec3d position;
       for (int row = 0; row < 3; ++row) {
         position[row] =
@@ -264,7 +289,8 @@ class GltfReader {
     };
     tell(omissions.points_and_lines, "ignored ", " primitives of points or lines");
     tell(omissions.morph_targets, "ignored the morph targets of ", " primitives");
-    tell(scene.skinned, "ignored the bones of ", " meshes, which keep the pose they are stored in");
+    tell(boneless_, "ignored the bones of ", " primitives without weights for them");
+    tell(scene.hidden, "left out ", " meshes that are hidden (KHR_node_visibility)");
     tell(scene.repeated, "read once each: ", " nodes that EXT_mesh_gpu_instancing repeats");
     tell(omissions.missing_coordinates, "ignored the textures of ",
          " primitives without texture coordinates");
@@ -283,8 +309,10 @@ class GltfReader {
   bool has_colours_ = false;
   Mesh mesh_;
   std::shared_ptr<Appearance> appearance_ = std::make_shared<Appearance>();
+  std::map<std::uint64_t, GltfSkin> skins_;
   PartNames names_;
   std::uint32_t first_vertex_ = 0;
+  std::uint64_t boneless_ = 0;
 };
 
 Mesh readGltf(const MeshFile& file) {

@@ -44,9 +44,10 @@ Type readType(const GltfValue& json) {
 }
 
 std::uint32_t readComponents(const GltfValue& json) {
+  if (json.text() == "MAT4") return 16;
   constexpr std::array<std::string_view, 4> names{"SCALAR", "VEC2", "VEC3", "VEC4"};
   const auto* const found = std::find(names.begin(), names.end(), json.text());
-  if (found == names.end()) json.refuse("must be SCALAR, VEC2, VEC3 or VEC4");
+  if (found == names.end()) json.refuse("must be SCALAR, VEC2, VEC3, VEC4 or MAT4");
   return static_cast<std::uint32_t>(found - names.begin() + 1);
 }
 

@@ -79,7 +79,7 @@ std::optional<std::uint64_t> optionalIndex(const GltfValue& json) {
 }
 
 /// What reading a vertex and a triangle takes, at most.
-constexpr std::uint64_t bytes_per_vertex = 72;
+constexpr std::uint64_t bytes_per_vertex = 104;
 constexpr std::uint64_t bytes_per_triangle = sizeof(Mesh::Triangle);
 
 }  // namespace
@@ -111,8 +111,8 @@ GltfPrimitive GltfPrimitives::readPlain(const GltfValue& json, std::uint64_t mod
   buffers_.takeMemory(used.size() * bytes_per_vertex);
   readVertices(
       json,
-      [&](const std::string& name, bool is_colour) {
-        return fromAccessor(attributes[name], used, count, is_colour);
+      [&](const std::string& name, bool is_fraction) {
+        return fromAccessor(attributes[name], used, count, is_fraction);
       },
       primitive);
   return primitive;
@@ -131,9 +131,10 @@ GltfPrimitive GltfPrimitives::readDraco(const GltfValue& json, const GltfValue& 
     std::iota(points.begin(), points.end(), std::uint32_t{0});
     readVertices(
         json,
-        [&](const std::string& name, bool is_colour) {
+        [&](const std::string& name, bool is_fraction) {
           const GltfValue id = compression["attributes"][name];
-          if (!id.exists()) return fromAccessor(attributes[name], points, points.size(), is_colour);
+          if (!id.exists())
+            return fromAccessor(attributes[name], points, points.size(), is_fraction);
           if (id.count() > std::numeric_limits<std::uint32_t>::max())
             id.refuse("must be a whole number of 32 bits");
           const DracoValues from = draco.valuesOf(static_cast<std::uint32_t>(id.count()));
@@ -142,7 +143,7 @@ GltfPrimitive GltfPrimitives::readDraco(const GltfValue& json, const GltfValue& 
                                          : GltfValue(file_, nullptr, "attributes");
           const bool is_normalized =
               from.is_integer &&
-              (is_colour || (accessor.exists() && accessors_.at(accessor.count()).is_normalized));
+              (is_fraction || (accessor.exists() && accessors_.at(accessor.count()).is_normalized));
           Values values{static_cast<std::uint32_t>(from.components), {}};
           const double one = is_normalized ? from.one : 1;
           values.values.reserve(points.size() * values.components);
@@ -187,13 +188,13 @@ std::vector<std::uint32_t> GltfPrimitives::cornersOf(const GltfValue& json,
 
 GltfPrimitives::Values GltfPrimitives::fromAccessor(const GltfValue& attribute,
                                                     std::span<const std::uint32_t> vertices,
-                                                    std::uint64_t count, bool is_colour) {
+                                                    std::uint64_t count, bool is_fraction) {
   if (!attribute.exists()) return {};
   const GltfAccessor& accessor = accessors_.at(attribute.count());
   if (accessor.count != count)
     attribute.refuse("leads to an accessor of " + std::to_string(accessor.count) + " for " +
                      std::to_string(count) + " vertices");
-  if (!is_colour || accessor.is_normalized)
+  if (!is_fraction || accessor.is_normalized)
     return {accessor.components, elementsOf(accessor, vertices)};
   GltfAccessor normalized = accessor;
   normalized.is_normalized = true;
@@ -213,7 +214,28 @@ void GltfPrimitives::readVertices(const GltfValue& json, const Source& source,
     }
     primitive.positions[i] = position;
   }
+  readBones(json, source, primitive);
   if (file_.wantsColours()) readLook(json, source, primitive);
+}
+
+/// The four strongest joints: other sets of them are passed over.
+void GltfPrimitives::readBones(const GltfValue& json, const Source& source,
+                               GltfPrimitive& primitive) {
+  constexpr std::size_t per_vertex = 4;
+  const Values joints = source("JOINTS_0", false);
+  const Values weights = source("WEIGHTS_0", true);
+  if (joints.components != per_vertex || weights.components != per_vertex) return;
+  primitive.bones.resize(primitive.positions.size());
+  for (std::size_t i = 0; i < primitive.bones.size(); ++i) {
+    for (std::size_t b = 0; b < per_vertex; ++b) {
+      const double joint = joints.values[per_vertex * i + b];
+      const double weight = weights.values[per_vertex * i + b];
+      if (!(joint >= 0 && joint <= std::numeric_limits<std::uint16_t>::max()) ||
+          !(weight >= 0 && std::isfinite(weight)))
+        json["attributes"].refuse("has joints or weights that are none");
+      primitive.bones[i][b] = {static_cast<std::uint16_t>(joint), static_cast<float>(weight)};
+    }
+  }
 }
 
 void GltfPrimitives::readLook(const GltfValue& json, const Source& source,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -16,6 +17,12 @@
 
 namespace vdbdither {
 
+/// A joint that moves a vertex, and its share.
+struct GltfBone {
+  std::uint16_t joint = 0;
+  float weight = 0;
+};
+
 /// Triangles with one material, as a glTF file has them.
 struct GltfPrimitive {
   std::vector<openvdb::Vec3d> positions;  ///< finite, in the units of the file
@@ -23,6 +30,7 @@ struct GltfPrimitive {
   // By vertex, where the primitive has them.
   std::vector<openvdb::Vec2f> coordinates;
   std::vector<openvdb::Vec4f> colours;
+  std::vector<std::array<GltfBone, 4>> bones;
   std::uint32_t material = 0;
   bool is_plain = true;  ///< of the default material, without colours and coordinates
 };
@@ -46,6 +54,7 @@ class GltfPrimitives {
   GltfPrimitive read(const GltfValue& json);
 
   [[nodiscard]] const GltfOmissions& omissions() const { return omissions_; }
+  [[nodiscard]] GltfAccessors& accessors() { return accessors_; }
 
  private:
   /// Components of each vertex; none where the primitive does not have them.
@@ -53,13 +62,15 @@ class GltfPrimitives {
     std::uint32_t components = 0;
     std::vector<double> values;
   };
-  /// Reads the attribute of this name. Integers of a colour count as normalized.
-  using Source = std::function<Values(const std::string& name, bool is_colour)>;
+  /// Reads the attribute of this name. Integers of a fraction, such as a colour, count
+  /// as normalized.
+  using Source = std::function<Values(const std::string& name, bool is_fraction)>;
 
   GltfPrimitive readPlain(const GltfValue& json, std::uint64_t mode);
   GltfPrimitive readDraco(const GltfValue& json, const GltfValue& compression);
   /// All that belongs to the vertices of `primitive`, which has only triangles.
   void readVertices(const GltfValue& json, const Source& source, GltfPrimitive& primitive);
+  static void readBones(const GltfValue& json, const Source& source, GltfPrimitive& primitive);
   void readLook(const GltfValue& json, const Source& source, GltfPrimitive& primitive);
   void readCoordinates(const Values& values, const GltfTextureTransform& transform,
                        GltfPrimitive& primitive);
@@ -67,7 +78,7 @@ class GltfPrimitives {
   std::vector<std::uint32_t> cornersOf(const GltfValue& json, std::uint64_t vertices);
   /// @param vertices  which of the `count` vertices
   Values fromAccessor(const GltfValue& attribute, std::span<const std::uint32_t> vertices,
-                      std::uint64_t count, bool is_colour);
+                      std::uint64_t count, bool is_fraction);
 
   const MeshFile& file_;
   GltfBuffers& buffers_;

@@ -81,7 +81,7 @@ class Walk {
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       const std::uint64_t node = nodes.at(i).count();
       // Scenes may share roots.
-      if (roots_.insert(node).second) visit(node, Mat4d::identity(), 1);
+      if (roots_.insert(node).second) visit(node, {Mat4d::identity(), true, 1});
     }
   }
 
@@ -94,30 +94,48 @@ class Walk {
       for (std::size_t c = 0; c < list.size(); ++c) children.insert(list.at(c).count());
     }
     for (std::uint64_t i = 0; i < nodes.size(); ++i) {
-      if (children.count(i) == 0) visit(i, Mat4d::identity(), 1);
+      if (children.count(i) == 0) visit(i, {Mat4d::identity(), true, 1});
     }
   }
 
-  void visit(std::uint64_t index, const Mat4d& to_parent, int level) {
+  /// What a node takes over from its parent.
+  struct Parent {
+    Mat4d to_world;
+    bool is_visible;
+    int level;  ///< of the node
+  };
+
+  void visit(std::uint64_t index, const Parent& parent) {
     throwIfInterrupted();
     const GltfValue node = root_["nodes"].at(index);
-    if (level > most_levels)
+    if (parent.level > most_levels)
       node.refuse("is nested deeper than " + std::to_string(most_levels) + " levels");
     if (!visited_.insert(index).second)
       node.refuse("has more than one parent, or is among its own children");
-    const Mat4d to_world = to_parent * transformOf(node);
+    const Mat4d to_world = parent.to_world * transformOf(node);
+    scene_.to_world.emplace(index, to_world);
+    const GltfValue visible = node["extensions"]["KHR_node_visibility"]["visible"];
+    const bool is_visible = parent.is_visible && (!visible.exists() || visible.flag());
     if (node.has("mesh")) {
-      const std::uint64_t mesh = node["mesh"].count();
-      const std::string_view name = node["name"].text().empty()
-                                        ? root_["meshes"].at(mesh)["name"].text()
-                                        : node["name"].text();
-      scene_.instances.push_back({mesh, std::string(name), to_world});
-      scene_.skinned += node.has("skin") ? 1 : 0;
-      scene_.repeated += node["extensions"].has("EXT_mesh_gpu_instancing") ? 1 : 0;
+      if (is_visible) {
+        addInstance(node, to_world);
+      } else {
+        ++scene_.hidden;
+      }
     }
     const GltfValue children = node["children"];
     for (std::size_t i = 0; i < children.size(); ++i)
-      visit(children.at(i).count(), to_world, level + 1);
+      visit(children.at(i).count(), {to_world, is_visible, parent.level + 1});
+  }
+
+  void addInstance(const GltfValue& node, const Mat4d& to_world) {
+    const std::uint64_t mesh = node["mesh"].count();
+    const std::string_view name =
+        node["name"].text().empty() ? root_["meshes"].at(mesh)["name"].text() : node["name"].text();
+    GltfInstance instance{mesh, std::string(name), to_world, std::nullopt};
+    if (node.has("skin")) instance.skin = node["skin"].count();
+    scene_.instances.push_back(std::move(instance));
+    scene_.repeated += node["extensions"].has("EXT_mesh_gpu_instancing") ? 1 : 0;
   }
 
   GltfValue root_;

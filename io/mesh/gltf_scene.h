@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,12 +17,14 @@ struct GltfInstance {
   std::uint64_t mesh = 0;
   std::string name;         ///< of the node or of its mesh; empty where neither has one
   openvdb::Mat4d to_world;  ///< for column vectors, in the units of the file
+  std::optional<std::uint64_t> skin;
 };
 
 struct GltfScene {
   std::vector<GltfInstance> instances;  ///< a node before its children, in the order of the file
-  std::uint64_t skinned = 0;            ///< nodes whose mesh bones would bend
+  std::map<std::uint64_t, openvdb::Mat4d> to_world;  ///< of every node that is reached
   std::uint64_t repeated = 0;  ///< nodes that EXT_mesh_gpu_instancing would draw several times
+  std::uint64_t hidden = 0;    ///< meshes that KHR_node_visibility does not show
 };
 
 /// Walks through the default scene, through all scenes where none is the default, and through all

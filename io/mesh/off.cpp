@@ -42,8 +42,24 @@ std::string_view offKeyword(std::string_view text) {
   return is_longer ? std::string_view() : text.substr(0, length);
 }
 
+/// The length of the comments and blanks that `text` starts with.
+std::size_t commentsBefore(std::string_view text) {
+  std::size_t at = 0;
+  while (at < text.size()) {
+    if (std::isspace(static_cast<unsigned char>(text[at])) != 0) {
+      ++at;
+    } else if (text[at] == '#') {
+      at = std::min(text.size(), text.find('\n', at));
+    } else {
+      break;
+    }
+  }
+  return at;
+}
+
 MeshMatch matchOff(const MeshFile& file) {
-  if (!offKeyword(file.start()).empty()) return MeshMatch::signature;
+  if (!offKeyword(file.start().substr(commentsBefore(file.start()))).empty())
+    return MeshMatch::signature;
   return file.isText() && file.isNamed(".off") ? MeshMatch::name : MeshMatch::none;
 }
 
@@ -77,12 +93,13 @@ class OffReader {
   /// The keyword may be missing, and the counts may follow it at once.
   void readHeader() {
     begin("the header", 0);
-    const std::string_view keyword = offKeyword(file_.start());
+    const std::string_view start = file_.start().substr(commentsBefore(file_.start()));
+    const std::string_view keyword = offKeyword(start);
     if (keyword.find_first_of("4n") != std::string_view::npos)
       refuse("announces vertices that do not have three coordinates");
     const auto has = [&](char letter) { return keyword.find(letter) != std::string_view::npos; };
     more_numbers_ = (has('S') ? 2 : 0) + (has('C') ? 4 : 0) + (has('N') ? 3 : 0);
-    text_ = TextCursor(file_.start().substr(keyword.size()), TextCursor::Comments::hash);
+    text_ = TextCursor(start.substr(keyword.size()), TextCursor::Comments::hash);
     begin("the header", 0);
     by_lines_ = false;
     const auto vertices = wholeNumber();

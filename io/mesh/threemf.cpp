@@ -14,6 +14,7 @@
 #include "io/mesh/threemf_model.h"
 #include "io/mesh/threemf_model_reader.h"
 #include "io/mesh/threemf_package.h"
+#include "io/mesh/threemf_volumes.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/printable.h"
 
@@ -37,6 +38,7 @@ class ThreemfReader {
     readPart(package_.root());
     // Objects of parts that are read lead to more parts.
     for (std::size_t part = 0; part < parts_.size(); ++part) readPartsOf(part);
+    leaveOutHelpers(readThreemfVolumes(package_), parts_.front(), file_);
     ThreemfBuild build(file_, parts_, [&](std::size_t part, const std::string& path) {
       return path.empty() ? part : index_of_member_.at(package_.find("model", path));
     });

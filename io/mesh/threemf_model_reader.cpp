@@ -13,6 +13,7 @@
 #include "io/mesh/text_cursor.h"
 #include "vdbdither/model/interrupt.h"
 #include "vdbdither/model/printable.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -417,7 +418,7 @@ double ThreemfModelReader::number(const XmlElement& element, std::string_view na
 }
 
 std::uint32_t ThreemfModelReader::index(const XmlElement& element, std::string_view name) const {
-  const std::string_view text = element.attribute(name).value_or("");
+  const std::string_view text = trimmed(element.attribute(name).value_or(""));
   std::uint32_t value = 0;
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, value);

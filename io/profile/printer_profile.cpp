@@ -72,6 +72,12 @@ std::pair<std::filesystem::path, std::string> readProfile(const std::string& nam
   if (!name_or_path.ends_with(".json")) {
     const std::vector<std::string> names = installedPrinters();
     if (std::find(names.begin(), names.end(), name_or_path) == names.end()) {
+      if (names.empty()) {
+        throw UsageError("no printer '" + name_or_path +
+                         "': no profiles are installed, or share/vdbdither is not beside the "
+                         "program; set VDBDITHER_DATA to it, or name a profile file ending in "
+                         ".json");
+      }
       std::string message = "no printer '" + name_or_path + "'; there are";
       for (const std::string& name : names) message += " " + name;
       throw UsageError(message + ", or name a profile file ending in .json");

@@ -129,9 +129,9 @@ void planFrame(const FrameOptions& options, const openvdb::CoordBBox& part,
           "--margin and --padding: the slices show the whole display or tray; leave "
           "them out, or give --tray none");
     layout.box = trayBox(options.tray, printer, stack.lattice, part, *size);
-  } else if (format.shows_display) {
+  } else if (format.shows_display && options.tray == Tray::usual) {
     warn(std::string(format.name) +
-         ": the slices show the part alone; the display is not known without a --printer");
+         ": the slices show the part alone; no --printer tells the size of the display");
   }
   std::array<std::int64_t, 2> pixels{};
   for (int axis = 0; axis < 2; ++axis) {

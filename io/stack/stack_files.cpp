@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "io/file/file_name.h"
+#include "io/file/files_read.h"
 #include "io/file/whole_file.h"
 #include "io/stack/slice_format.h"
 #include "vdbdither/model/errors.h"
@@ -148,6 +149,11 @@ std::vector<std::string> StackInput::names() const {
   if (error) throw DataError("cannot read '" + folder.string() + "': " + error.message());
   std::sort(names.begin(), names.end());
   return names;
+}
+
+void StackInput::noteRead(std::span<const std::string> names) const {
+  if (zip_) return;
+  for (const std::string& name : names) noteFileRead(place_ / name);
 }
 
 /// Names do not climb out of the stack, so only links lead out.

@@ -1,6 +1,7 @@
 #include "io/stack/stack_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <set>
 #include <span>
 #include <utility>
@@ -52,6 +53,10 @@ StackReader::StackReader(const std::filesystem::path& path, EditedStack edited,
   indexSlices();
   checkFiles();
   if (!input_.described()) checkForOthers();
+  // Of other stacks the manifest has the digests.
+  if (edited_ == EditedStack::taken) {
+    for (const Manifest::Slice& slice : manifest_.slices) input_.noteRead(std::array{slice.file});
+  }
   meanings_ = meaningsOfPixels(manifest_, [&](std::uint32_t material, std::uint32_t other) {
     throw DataError(
         sameColourText(manifest_, material, other) +

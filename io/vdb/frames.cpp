@@ -128,7 +128,7 @@ FrameReader::FrameReader(int descriptor, std::string where, const std::string& f
 
 const Schema& FrameReader::schema() {
   if (!schema_) {
-    checkGrids(whole_.grids, where_);
+    admitGrids(whole_.grids, where_);
     schema_ = schemaOf(whole_, where_);
     const ZRange layers = schema_->lattice.layers();
     if (!framed_) foreign_ = Slab{layers, layers, std::move(whole_.grids)};
@@ -170,7 +170,7 @@ std::optional<Slab> FrameReader::next() {
     words >> slab.core.begin >> slab.core.end;
     if (words && !slab.core.empty() && slab.core.begin == next_layer_.value_or(slab.core.begin) &&
         intersection(slab.core, known.lattice.layers()) == slab.core) {
-      checkGrids(contents.grids, where_);
+      admitGrids(contents.grids, where_);
       slab.valid = slab.core;
       slab.grids = std::move(contents.grids);
       layers_ += slab.core.size();

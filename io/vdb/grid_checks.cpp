@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <sstream>
+#include <type_traits>
 #include <vector>
 
 #include <tbb/blocked_range.h>
@@ -16,6 +17,7 @@
 
 namespace vdbdither {
 
+using openvdb::BoolGrid;
 using openvdb::Coord;
 
 namespace {
@@ -83,6 +85,29 @@ std::optional<std::string> notFiniteOf(const TreeT& tree) {
   return std::nullopt;
 }
 
+bool holdsActiveFalse(const openvdb::BoolTree& tree) {
+  auto tile = tree.cbeginValueOn();
+  tile.setMaxDepth(openvdb::BoolTree::ValueOnCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    if (!*tile) return true;
+  }
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+    const auto* values = leaf->buffer().data();
+    for (openvdb::Index n = 0; n < 8; ++n) {
+      if ((leaf->getValueMask().getWord<openvdb::Index64>(n) & ~values[n]) != 0) return true;
+    }
+  }
+  return false;
+}
+
+BoolGrid::Ptr withoutActiveFalse(const BoolGrid& grid) {
+  BoolGrid::Ptr copy = grid.deepCopy();
+  for (auto value = copy->beginValueOn(); value; ++value) {
+    if (!*value) value.setValueOff();
+  }
+  return copy;
+}
+
 /// Level sets, and `surface` of a tool that leaves the class open.
 bool holdsDistances(const openvdb::GridBase& grid) {
   return grid.getGridClass() == openvdb::GRID_LEVEL_SET ||
@@ -112,6 +137,11 @@ std::optional<std::string> faultOf(const openvdb::GridBase& grid) {
                 ", so that everything beyond its voxels is inside" + mend;
       }
     }
+    if constexpr (std::is_same_v<ValueT, bool>) {
+      if (typed.background() && typed.getName() == solid_grid)
+        fault = std::string("has the background true, so that everything beyond its voxels is in") +
+                mend;
+    }
   });
   return fault;
 }
@@ -122,8 +152,13 @@ GridConstPtr checked(const Grids::value_type& grid, const std::string& where) {
   return grid.second;
 }
 
-void checkGrids(const Grids& grids, const std::string& where) {
-  for (const auto& grid : grids) checked(grid, where);
+void admitGrids(Grids& grids, const std::string& where) {
+  for (auto& grid : grids) {
+    checked(grid, where);
+    if (const auto voxels = openvdb::GridBase::grid<BoolGrid>(grid.second);
+        voxels && holdsActiveFalse(voxels->tree()))
+      grid.second = withoutActiveFalse(*voxels);
+  }
 }
 
 }  // namespace vdbdither

@@ -79,7 +79,7 @@ void SlabReader::openFile(const std::vector<std::string>& names) {
   VdbContents contents = readVdb(path_);
   // Grids that are not wanted may lie on any lattice.
   keepNamed(contents.grids, names);
-  checkGrids(contents.grids, shown_);
+  admitGrids(contents.grids, shown_);
   schema_ = schemaOf(contents, shown_);
   // A file without that metadata holds all layers, even beyond its box.
   ZRange held{std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};

@@ -214,6 +214,13 @@ class ImageStacks(ProgramTest):
         self.draw_plain("a1234567890123456789.png")
         self.refuse_import("has a number of more than 18 digits", *PITCH)
 
+    def test_tiff_packed_with_loss_is_refused(self):
+        (self.folder / "lossy").mkdir()
+        for z in range(2):
+            Image.new("RGB", (16, 16), (200, 30, 30)).save(self.folder / f"lossy/{z}.tif", compression="jpeg")
+        self.refuse(1, "is a TIFF packed as JPEG, which changes pixels; save it with LZW or deflate", "slice-import", "lossy",
+                    "--pitch", "50um,50um,50um", "-o", "a.vdb")
+
     def test_slices_that_are_not_alike_are_refused(self):
         self.draw_plain("a1.png", "a2.png")
         self.draw_plain("a2.png", size=(5, 3))

@@ -83,6 +83,10 @@ class Jobs(ProgramTest):
         self.assertEqual(lines, [f"vdbdither piece . {number}" for number in range(4)])
         for line in reversed(lines):
             subprocess.run(line, shell=True, cwd=moved / "job", env=self.environment(), check=True, capture_output=True)
+        (moved / "part.stl").rename(moved / "other.stl")
+        self.refuse(1, f"there is no '{moved}/part.stl', which the job reads; a job that is moved takes its inputs along",
+                    "merge", "elsewhere/job")
+        (moved / "other.stl").rename(moved / "part.stl")
         self.succeed("merge", "elsewhere/job")
         self.assertEqual(self.files("elsewhere/out"), self.files("one"))
 
@@ -243,9 +247,59 @@ class Jobs(ProgramTest):
         path.write_text("[")
         self.refuse(1, "is not a job of plan: it is not a JSON object", "merge", "job")
 
-    def test_merging_does_not_replace_what_is_there(self):
-        self.make(self.plan(f"{DITHER} ! slice-export out"))
+    def test_merging_replaces_what_is_there_only_where_it_is_told_to(self):
+        chain = f"{DITHER} ! slice-export out ! write solid.vdb"
+        self.make(self.plan(chain))
+        one = {name: self.files(name) for name in ("out", "solid.vdb")}
         self.refuse(2, "'out' exists; --overwrite replaces it", "merge", "job")
+        (self.folder / "solid.vdb").unlink()
+        self.succeed("merge", "job", "--overwrite")
+        self.assertEqual({name: self.files(name) for name in ("out", "solid.vdb")}, one)
+        shutil.rmtree(self.folder / "job")
+        self.plan(f"{DITHER} -o solid.vdb --overwrite", "--pieces", "2")
+        chain = json.loads((self.folder / "job/job.json").read_text())
+        chain["chain"].remove("--overwrite")
+        (self.folder / "job/job.json").write_text(json.dumps(chain))
+        self.succeed("piece", "job", "0-1")
+        self.refuse(2, "'solid.vdb' exists; --overwrite replaces it", "merge", "job")
+        self.succeed("merge", "job", "--overwrite")
+
+    def test_what_a_chain_reads_it_cannot_write_in_pieces(self):
+        self.succeed("run", f"{DITHER} ! slice-export out ! write solid.vdb")
+        os.symlink(self.folder, self.folder / "link")
+        for chain, read, written in (("read solid.vdb ! write solid.vdb --overwrite", "solid.vdb", "solid.vdb"),
+                                     ("read link/solid.vdb ! write solid.vdb --overwrite", "link/solid.vdb", "solid.vdb"),
+                                     ("slice-import out ! slice-export out --overwrite", "out/manifest.json", "out")):
+            self.refuse(2, f"the chain reads '{read}' and writes '{written}', so that pieces would read what the merge has written",
+                        "plan", chain, "--pieces", "2")
+        # The old output is no input.
+        job = self.plan(f"{DITHER} ! slice-export out --overwrite", "--pieces", "2")
+        self.assertEqual([entry["file"] for entry in job["inputs"] if entry.get("file", "").startswith("out")], [])
+
+    def test_every_slice_of_a_stack_without_digests_is_an_input(self):
+        self.succeed("run", f"{DITHER} ! slice-export out")
+        slices = sorted(path.name for path in (self.folder / "out").glob("slice_*.png"))
+        (self.folder / "images").mkdir()
+        for name in slices:
+            shutil.copy(self.folder / "out" / name, self.folder / "images" / name)
+        for chain, folder in (("slice-import images --pitch 42um,84um,22um --background black", "images"),
+                              ("slice-import out --edited", "out")):
+            job = self.plan(f"{chain} ! slice-export again", "--pieces", "2")
+            self.assertEqual([entry["file"] for entry in job["inputs"] if entry.get("file", "").endswith("png")],
+                             [f"{folder}/{name}" for name in slices])
+            self.succeed("piece", "job", "0")
+            changed = self.folder / folder / slices[-1]
+            changed.write_bytes(changed.read_bytes() + b" ")
+            self.refuse(1, f"'{folder}/{slices[-1]}' is not the file that the job was planned with", "piece", "job", "1")
+            shutil.rmtree(self.folder / "job")
+
+    def test_files_of_desktops_beside_a_piece_do_not_spoil_it(self):
+        job = self.plan(f"{DITHER} ! slice-export out")
+        self.succeed("piece", "job", "0-3")
+        for name in (".DS_Store", "Thumbs.db", "desktop.ini", ".nfs000001"):
+            (self.folder / "job/pieces/0001" / name).write_text("x")
+        self.assertEqual(self.succeed("piece", "job", "0-3").count(b"is there"), 4)
+        self.succeed("merge", "job")
 
     def test_the_script_of_slurm_asks_for_what_the_pieces_take(self):
         job = self.plan(f"{DITHER} ! slice-export out --threads 1")
@@ -267,6 +321,11 @@ class Jobs(ProgramTest):
             subprocess.run(["sh", "job.sbatch"], cwd=self.folder / "job", check=True, capture_output=True,
                            env={**environment, "VDBDITHER_STEP": step, "SLURM_ARRAY_TASK_ID": str(task), "SLURM_CPUS_PER_TASK": "1"})
         self.assertTrue((self.folder / "out/manifest.json").exists())
+        # Slurm counts how often it has queued a task again.
+        for restarts, code in (({}, 2), ({"SLURM_RESTART_COUNT": "1"}, 0)):
+            again = subprocess.run(["sh", "job.sbatch"], cwd=self.folder / "job", capture_output=True,
+                                   env={**environment, "VDBDITHER_STEP": "merge", "SLURM_CPUS_PER_TASK": "1", **restarts})
+            self.assertEqual(again.returncode, code)
 
     def test_the_template_of_open_job_description_says_the_same(self):
         self.plan(f"{DITHER} ! slice-export out")
@@ -331,6 +390,9 @@ class ProgressLines(ProgramTest):
     def test_a_failure_is_told(self):
         done = self.run_program("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "-o", "/dev/full/x.vdb", "--progress", "openjd")
         self.assertEqual(done.returncode, 2)
+        self.assertIn("openjd_fail: write: cannot write to '/dev/full/x.vdb'", done.stderr.decode())
+        done = self.run_program("mesh2sdf", "part.stl", "--printer", "none", "-o", "x.vdb", "--progress=openjd")
+        self.assertRegex(done.stderr.decode(), r"^openjd_fail: .*no printer 'none'")
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(1, 20))
         job = self.run_program("plan", f"mesh2sdf part.stl {' '.join(MIMAKI)} -o out.vdb", "--pieces", "1")
         self.assertEqual(job.returncode, 0)

@@ -3,11 +3,12 @@
 import copy
 import json
 import re
+import shutil
 import unittest
 
 import jsonschema
 import meshes
-from program import ROOT, ProgramTest
+from program import PROGRAM, ROOT, ProgramTest
 
 PRINTERS = ROOT / "samples/printers"
 PROFILES = sorted((path for path in PRINTERS.glob("*.json") if path.stem != "schema"), key=lambda path: path.stem)
@@ -68,6 +69,9 @@ class Printers(ProgramTest):
                      "materials   white 240,240,240,255"):
             self.assertIn(line + "\n", said)
         self.refuse(2, "no printer 'mimaki'; there are anycubic-photon-mono-m5s ", "printers", "show", "mimaki")
+        shutil.copy(PROGRAM, self.folder / "alone")
+        self.refuse(2, "no printer 'mimaki': no profiles are installed, or share/vdbdither is not beside the program; set VDBDITHER_DATA to it, "
+                    "or name a profile file ending in .json", "printers", "show", "mimaki", program=self.folder / "alone")
         self.refuse(2, "no printer 'schema'; there are ", "printers", "show", "schema")
 
     def test_show_tells_every_field(self):

@@ -112,18 +112,26 @@ void Console::tell(const State& state) {
   std::fputs((jsonText(json) + "\n").c_str(), stderr);
 }
 
-void Console::end(const char* error) {
+Console::~Console() {
+  if (teller_.joinable()) {
+    teller_.request_stop();
+    teller_.join();
+  }
+  clear();
+}
+
+void Console::end() {
   clear();
   if (!teller_.joinable()) return;
   teller_.request_stop();
   teller_.join();
-  if (error == nullptr) {
-    state_.share = 1;
-    state_.done = state_.total;
-    tell(state_);
-  } else if (style_ == Progress::openjd) {
-    std::fputs(("openjd_fail: " + printable(error) + "\n").c_str(), stderr);
-  }
+  state_.share = 1;
+  state_.done = state_.total;
+  tell(state_);
+}
+
+void Console::tellFailure(const std::string& message) {
+  std::fputs(("openjd_fail: " + printable(message) + "\n").c_str(), stderr);
 }
 
 void Console::clear() {

@@ -18,6 +18,9 @@ namespace vdbdither {
 class Console : public Watcher {
  public:
   explicit Console(Progress style = Progress::bar) : style_(style) {}
+  Console(const Console&) = delete;
+  Console& operator=(const Console&) = delete;
+  ~Console() override;
 
   /// \param quiet             no line of progress
   /// \param box_voxels        the voxels of the whole job, for the rate
@@ -30,8 +33,10 @@ class Console : public Watcher {
   void print(const std::string& text) override;
   /// Removes the line.
   void clear();
-  /// Ends the progress: the run came to its end, or failed with `error`.
-  void end(const char* error = nullptr);
+  /// Ends the progress: the run came to its end.
+  void end();
+  /// Tells Open Job Description why the run failed.
+  static void tellFailure(const std::string& message);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <malloc.h>
 #include <new>
 
@@ -109,12 +110,7 @@ void printStages(const JobReport& report, double seconds) {
 /// Runs `job`, a Pipeline or a ToolRun, by `function` and reports what it did.
 template <typename Job, typename Function>
 void runReported(Job& job, Console& console, Clock::time_point start, const Function& function) {
-  try {
-    function();
-  } catch (const std::exception& error) {
-    console.end(error.what());
-    throw;
-  }
+  function();
   console.end();
   const RunOptions& options = job.options();
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
@@ -194,9 +190,20 @@ bool namesItsVerb(const std::string& message) {
                      [&](const OperatorInfo* info) { return first == info->name; });
 }
 
+/// Whether the arguments ask for progress in the words of Open Job Description. A run may fail
+/// before its options are parsed.
+bool tellsOpenJobDescription(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  const auto option = std::find(words.begin(), words.end(), "--progress");
+  return std::find(words.begin(), words.end(), "--progress=openjd") != words.end() ||
+         (option != words.end() && std::next(option) != words.end() &&
+          *std::next(option) == "openjd");
+}
+
 int guardedMain(int argc, char** argv) {
-  const auto fail = [](const std::string& message, int code) {
+  const auto fail = [&](const std::string& message, int code) {
     claimEnding(code);
+    if (tellsOpenJobDescription(argc, argv)) Console::tellFailure(message);
     std::fprintf(stderr, "vdbdither%s %s\n", namesItsVerb(message) ? "" : ":",
                  printable(message).c_str());
     return code;

@@ -116,8 +116,8 @@ TEST(GltfRefusals, AccessorsOutOfRange) {
   EXPECT_EQ(with("bufferView", 1), "'part': bufferViews[1] is named, but there are 1" + again);
   EXPECT_EQ(with("componentType", 5124),
             "'part': accessors[0].componentType is not a component type" + again);
-  EXPECT_EQ(refusalAfter([](Json& json) { json["accessors"][0]["type"] = "MAT4"; }),
-            "'part': accessors[0].type must be SCALAR, VEC2, VEC3 or VEC4" + again);
+  EXPECT_EQ(refusalAfter([](Json& json) { json["accessors"][0]["type"] = "MAT3"; }),
+            "'part': accessors[0].type must be SCALAR, VEC2, VEC3, VEC4 or MAT4" + again);
   EXPECT_EQ(refusalAfter([](Json& json) { json["bufferViews"][0]["byteStride"] = 1ULL << 53; }),
             beyond);
 }

@@ -220,9 +220,83 @@ TEST(Gltf, WarnsOfWhatItPassesOver) {
   EXPECT_THAT(warnings,
               ElementsAre("'part': ignored 1 primitives of points or lines",
                           "'part': ignored the morph targets of 1 primitives",
-                          "'part': ignored the bones of 1 meshes, which keep the pose they are "
-                          "stored in",
+                          "'part': ignored the bones of 1 primitives without weights for them",
                           "'part': read once each: 1 nodes that EXT_mesh_gpu_instancing repeats"));
+}
+
+/// A triangle that two joints move: one of its corners by halves.
+GltfFile withBones() {
+  GltfFile file = GltfFile::ofTriangle();
+  Json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
+  attributes["JOINTS_0"] =
+      file.add<std::uint8_t>({0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}, GltfFile::uint8, "VEC4");
+  attributes["WEIGHTS_0"] =
+      file.add<float>({1, 0, 0, 0, 1, 0, 0, 0, 0.5, 0.5, 0, 0}, GltfFile::float32, "VEC4");
+  // Of both joints the node and its bind pose are shifted, one along x and one along z.
+  std::vector<float> binds{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -1, 0, 0, 1,
+                           1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0,  0, 0, 1};
+  const int matrices = file.add<float>(binds, GltfFile::float32, "MAT4");
+  file.json["accessors"][static_cast<std::size_t>(matrices)]["count"] = 2;
+  file.json["nodes"][0]["skin"] = 0;
+  file.json["nodes"][0]["scale"] = {100, 100, 100};
+  file.json["nodes"].push_back({{"translation", {1, 0, 0}}});
+  file.json["nodes"].push_back({{"translation", {0, 0, 2}}});
+  file.json["scenes"][0]["nodes"].push_back(1);
+  file.json["scenes"][0]["nodes"].push_back(2);
+  file.json["skins"] = {{{"joints", {1, 2}}, {"inverseBindMatrices", matrices}}};
+  return file;
+}
+
+TEST(Gltf, BonesPlaceAMeshAndItsNodeDoesNot) {
+  EXPECT_THAT(parseQuietly(withBones().text()).vertices,
+              ElementsAre(Vec3d(0, 0, 0), Vec3d(1000, 0, 2000), Vec3d(0, 1000, 1000)));
+}
+
+TEST(Gltf, RefusesBonesThatThereAreNot) {
+  const std::string again = "; export the file again";
+  GltfFile file = withBones();
+  file.json["skins"][0]["joints"] = {1};
+  EXPECT_EQ(refusal(file.text()), "'part': skins[0] has no joint 1, which a vertex names" + again);
+  file = withBones();
+  file.json["skins"][0]["joints"] = {1, 7};
+  EXPECT_EQ(refusal(file.text()),
+            "'part': skins[0].joints[1] is a joint that no scene holds" + again);
+  file = withBones();
+  file.json["skins"][0]["inverseBindMatrices"] = 0;
+  EXPECT_EQ(
+      refusal(file.text()),
+      "'part': skins[0].inverseBindMatrices leads to an accessor that is none of a matrix for "
+      "each joint" +
+          again);
+  file = withBones();
+  file.json["skins"] = Json::array();
+  EXPECT_THAT(refusal(file.text()), testing::HasSubstr("skins"));
+  file = withBones();
+  const int none = file.add<float>(std::vector<float>(12, 0), GltfFile::float32, "VEC4");
+  file.json["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = none;
+  EXPECT_EQ(refusal(file.text()),
+            "'part': skins[0] moves a vertex by joints without weight" + again);
+  file = withBones();
+  const int below = file.add<float>(std::vector<float>(12, -1), GltfFile::float32, "VEC4");
+  file.json["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = below;
+  EXPECT_EQ(
+      refusal(file.text()),
+      "'part': meshes[0].primitives[0].attributes has joints or weights that are none" + again);
+}
+
+TEST(Gltf, LeavesOutWhatIsHidden) {
+  GltfFile file = GltfFile::ofTriangle();
+  file.addMesh(file.triangle());
+  file.json["nodes"][0]["extensions"] = {{"KHR_node_visibility", {{"visible", true}}}};
+  EXPECT_THAT(parseQuietly(file.text()).triangles, SizeIs(2));
+  // What lies below is hidden too.
+  file.json["nodes"].push_back(
+      {{"children", {1}}, {"extensions", {{"KHR_node_visibility", {{"visible", false}}}}}});
+  file.json["scenes"][0]["nodes"] = {0, 2};
+  Warnings warnings;
+  EXPECT_THAT(parse(file.text(), &warnings).triangles, SizeIs(1));
+  EXPECT_THAT(warnings,
+              ElementsAre("'part': left out 1 meshes that are hidden (KHR_node_visibility)"));
 }
 
 TEST(Gltf, SparseElementsReplaceOthers) {

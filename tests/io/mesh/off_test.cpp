@@ -36,8 +36,8 @@ TEST(Off, ReadsPastNormalsColoursAndTextureCoordinates) {
     SCOPED_TRACE(keyword);
     const std::string vertices =
         "0 0 0 255 0 0 255\n1 0 0 0.5 0.5 0.5 1\n\n# the last\n0 1 0 0 0 1 # up\n";
-    expectTriangle(
-        parseQuietly(std::string(keyword) + "\n3 1 0\n" + vertices + "3 0 1 2  0.1 0.2 0.3\n"));
+    expectTriangle(parseQuietly("# by hand\n \n" + std::string(keyword) + "\n3 1 0\n" + vertices +
+                                "3 0 1 2  0.1 0.2 0.3\n"));
   }
 }
 

@@ -68,13 +68,40 @@ TEST_F(GridChecks, TilesBackgroundsAndVectorsAreCheckedToo) {
 TEST_F(GridChecks, ALevelSetThatIsInsideEverywhereIsRefused) {
   const auto grid = FloatGrid::create(-1);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  Grids grids{{"surface", grid}};
   EXPECT_THAT(
-      [&] {
-        checkGrids({{"surface", grid}}, "'part.vdb'");
-      },
+      [&] { admitGrids(grids, "'part.vdb'"); },
       ThrowsMessage<DataError>(
           "'part.vdb': grid 'surface' holds distances with the background -1, so that "
           "everything beyond its voxels is inside; mend it in the tool that it comes from"));
+}
+
+TEST_F(GridChecks, VoxelsAreInOnlyWhereTheyAreActiveAndTrue) {
+  const auto solid = openvdb::BoolGrid::create(false);
+  solid->setName("solid");
+  solid->tree().fill(openvdb::CoordBBox(Coord(0), Coord(39)), false, true);
+  solid->tree().setValueOn(Coord(3, 4, 5), true);
+  solid->tree().setValueOn(Coord(100, 0, 0), true);
+  Grids grids{{"solid", solid}};
+  admitGrids(grids, "'part.vdb'");
+  const auto voxels = openvdb::GridBase::grid<openvdb::BoolGrid>(grids.at("solid"));
+  EXPECT_EQ(voxels->activeVoxelCount(), 2U);
+  EXPECT_TRUE(voxels->tree().isValueOn(Coord(3, 4, 5)));
+  EXPECT_TRUE(voxels->tree().isValueOn(Coord(100, 0, 0)));
+  EXPECT_EQ(voxels->getName(), "solid");
+  EXPECT_EQ(solid->activeVoxelCount(), 64001U) << "the grid that was given stays";
+  // A grid without such voxels is not copied.
+  const GridConstPtr sound = grids.at("solid");
+  admitGrids(grids, "'part.vdb'");
+  EXPECT_EQ(grids.at("solid"), sound);
+}
+
+TEST_F(GridChecks, VoxelsThatAreInEverywhereBeyondAreRefused) {
+  const auto solid = openvdb::BoolGrid::create(true);
+  solid->setName("solid");
+  EXPECT_THAT(faultOf(*solid),
+              Optional(StartsWith("has the background true, so that everything beyond its voxels "
+                                  "is in; ")));
 }
 
 TEST_F(GridChecks, DistancesWithoutAClassAreCheckedByTheirName) {
