@@ -42,8 +42,8 @@ std::string_view offKeyword(std::string_view text) {
   return is_longer ? std::string_view() : text.substr(0, length);
 }
 
-/// The length of the comments and blanks that `text` starts with.
-std::size_t commentsBefore(std::string_view text) {
+/// The text behind the comments and blanks that it starts with.
+std::string_view withoutComments(std::string_view text) {
   std::size_t at = 0;
   while (at < text.size()) {
     if (std::isspace(static_cast<unsigned char>(text[at])) != 0) {
@@ -54,12 +54,11 @@ std::size_t commentsBefore(std::string_view text) {
       break;
     }
   }
-  return at;
+  return text.substr(at);
 }
 
 MeshMatch matchOff(const MeshFile& file) {
-  if (!offKeyword(file.start().substr(commentsBefore(file.start()))).empty())
-    return MeshMatch::signature;
+  if (!offKeyword(withoutComments(file.start())).empty()) return MeshMatch::signature;
   return file.isText() && file.isNamed(".off") ? MeshMatch::name : MeshMatch::none;
 }
 
@@ -93,7 +92,7 @@ class OffReader {
   /// The keyword may be missing, and the counts may follow it at once.
   void readHeader() {
     begin("the header", 0);
-    const std::string_view start = file_.start().substr(commentsBefore(file_.start()));
+    const std::string_view start = withoutComments(file_.start());
     const std::string_view keyword = offKeyword(start);
     if (keyword.find_first_of("4n") != std::string_view::npos)
       refuse("announces vertices that do not have three coordinates");

@@ -80,8 +80,8 @@ TEST(SliceFrame, DisplaysAreShownWholeAndMirroredByTheirFormats) {
 
   const Planned unknown = planned(part, {}, "sl1", {});
   EXPECT_EQ(unknown.layout.box, part);
-  EXPECT_THAT(unknown.warnings, ElementsAre("sl1: the slices show the part alone; the display is "
-                                            "not known without a --printer"));
+  EXPECT_THAT(unknown.warnings, ElementsAre("sl1: the slices show the part alone; no --printer "
+                                            "tells the size of the display"));
   EXPECT_EQ(planned(part, {.tray = Tray::none, .padding = 1}, "sl1", display()).layout.width(),
             22U);
 }
