@@ -1,6 +1,7 @@
 #include "ops/kernels/colour/coverage_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -38,7 +39,7 @@ class ColourReader : public CoverageReader {
  public:
   ColourReader(const openvdb::Vec3SGrid& colour, const FloatGrid* opacity, const InkSet& set,
                const Separation& separation)
-      : colour_(colour.tree()), set_(set), separation_(separation), inks_(set.inks.size()) {
+      : colour_(colour.tree()), set_(set), separation_(separation) {
     if (opacity != nullptr && set.clear) opacity_.emplace(opacity->tree());
   }
 
@@ -57,15 +58,16 @@ class ColourReader : public CoverageReader {
   unsigned read(unsigned column, unsigned layers, std::span<float> coverages) override {
     const auto lowest = static_cast<unsigned>(std::countr_zero(layers));
     const Vec3s colour = colourAt(column + lowest);
-    if (!known_ || !sameBits(colour, last_)) {
+    // Voxels that are near each other often have one colour.
+    Separated& separated = separated_[placeOf(colour)];
+    if (separated.inks.empty() || !sameBits(colour, separated.colour)) {
       if (!std::isfinite(colour[0]) || !std::isfinite(colour[1]) || !std::isfinite(colour[2]))
         refuse(column + lowest);
-      separation_.run(colour, inks_);
-      last_ = colour;
-      known_ = true;
+      separated.colour = colour;
+      separated.inks.resize(set_.inks.size());
+      separation_.run(colour, separated.inks);
     }
-    std::copy(inks_.begin(), inks_.end(), coverages.begin());
-    // Voxels below each other often have one colour.
+    std::copy(separated.inks.begin(), separated.inks.end(), coverages.begin());
     unsigned alike = 1U << lowest;
     if (opacity_) {
       addClear(opacityAt(column + lowest), coverages);
@@ -80,6 +82,20 @@ class ColourReader : public CoverageReader {
   }
 
  private:
+  /// A colour and its coverages; none at first.
+  struct Separated {
+    Vec3s colour{0.0F};
+    std::vector<float> inks;
+  };
+  static constexpr int place_bits = 6;
+
+  static std::size_t placeOf(const Vec3s& colour) {
+    std::uint32_t hash = 0;
+    for (int c = 0; c < 3; ++c)
+      hash = (hash ^ std::bit_cast<std::uint32_t>(colour[c])) * 0x9e3779b1U;
+    return hash >> (32 - place_bits);
+  }
+
   [[nodiscard]] const Vec3s& colourAt(unsigned offset) const {
     return values_ != nullptr ? values_[offset] : tile_colour_;
   }
@@ -115,9 +131,7 @@ class ColourReader : public CoverageReader {
   const Vec3s* values_ = nullptr;  ///< of leaf_
   const FloatTree::LeafNodeType* opacity_leaf_ = nullptr;
   Vec3s tile_colour_{0.0F};
-  bool known_ = false;
-  Vec3s last_{0.0F};         ///< the colour that was separated last, if known
-  std::vector<float> inks_;  ///< its coverages
+  std::array<Separated, std::size_t{1} << place_bits> separated_;  ///< by place
 };
 
 class GridReader : public CoverageReader {

@@ -31,29 +31,30 @@ class Intervals {
  public:
   /// @param order  of the materials: indices in `coverages`
   void set(std::span<const std::size_t> order, std::span<const float> coverages) {
-    parts_.clear();
+    materials_.clear();
+    ends_.clear();
     float end = 0;
     for (const std::size_t material : order) {
       if (coverages[material] == 0) continue;
       end += coverages[material];
-      parts_.push_back({end, static_cast<std::int32_t>(material) + 1});
+      materials_.push_back(static_cast<std::int32_t>(material) + 1);
+      ends_.push_back(end);
     }
+    // The last takes what is left: sums of single precision may stay below a threshold.
+    ends_.pop_back();
   }
 
-  /// Returns the material whose part holds a threshold, counted from 1. The last takes what is
-  /// left: sums of single precision may stay below the threshold.
+  /// Returns the material whose part holds a threshold, counted from 1. It counts rather than
+  /// searches, because nobody can foresee where a search ends.
   [[nodiscard]] std::int32_t at(float threshold) const {
-    std::size_t n = 0;
-    while (n + 1 < parts_.size() && parts_[n].end <= threshold) ++n;
-    return parts_[n].material;
+    std::size_t before = 0;
+    for (const float end : ends_) before += end <= threshold ? 1 : 0;
+    return materials_[before];
   }
 
  private:
-  struct Part {
-    float end;
-    std::int32_t material;
-  };
-  std::vector<Part> parts_;
+  std::vector<std::int32_t> materials_;
+  std::vector<float> ends_;  ///< of all but the last
 };
 
 }  // namespace

@@ -75,18 +75,18 @@ PlaceOnTriangle nearestPlace(const Vec3d& a, const Vec3d& b, const Vec3d& c, con
 }
 
 PointOnTriangle nearestOnTriangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
-  const auto [where, weights] = nearestPlace(a, b, c, p);
-  switch (where) {
+  const PlaceOnTriangle place = nearestPlace(a, b, c, p);
+  switch (place.where) {
     case 0:
-      return {a, where};
+      return {a, place};
     case 1:
-      return {b, where};
+      return {b, place};
     case 2:
-      return {c, where};
+      return {c, place};
     case 4:
-      return {b + (c - b) * weights[2], where};
+      return {b + (c - b) * place.weights[2], place};
     default:
-      return {a + (b - a) * weights[1] + (c - a) * weights[2], where};
+      return {a + (b - a) * place.weights[1] + (c - a) * place.weights[2], place};
   }
 }
 
@@ -210,8 +210,8 @@ ClosestPoint ClosestPoints::operator()(const Vec3d& p, std::uint32_t hint) const
   }
 
   const Mesh::Triangle& t = mesh_.triangles[best.triangle];
-  const auto corner = best.at.corner();
-  const auto side = best.at.side();
+  const auto corner = best.at.place.corner();
+  const auto side = best.at.place.side();
   const Vec3d& normal = corner ? vertex_normals_[t[*corner]]
                         : side ? edge_normals_[3 * std::size_t{best.triangle} + *side]
                                : normals_[best.triangle];

@@ -19,6 +19,14 @@ using CornerWeights = std::array<double, 3>;
 struct PlaceOnTriangle {
   int where;  ///< 0–2: a corner; 3–5: the side from corner n − 3; 6: the face
   CornerWeights weights;
+
+  [[nodiscard]] std::optional<std::size_t> corner() const {
+    return where < 3 ? std::optional(static_cast<std::size_t>(where)) : std::nullopt;
+  }
+  [[nodiscard]] std::optional<std::size_t> side() const {
+    return where >= 3 && where < 6 ? std::optional(static_cast<std::size_t>(where - 3))
+                                   : std::nullopt;
+  }
 };
 
 /// Returns where the point of the triangle a, b, c nearest to p lies (Ericson 2005, 5.1.5).
@@ -28,15 +36,7 @@ PlaceOnTriangle nearestPlace(const openvdb::Vec3d& a, const openvdb::Vec3d& b,
 /// The nearest point of a triangle to a given one.
 struct PointOnTriangle {
   openvdb::Vec3d point;
-  int where;  ///< see PlaceOnTriangle
-
-  [[nodiscard]] std::optional<std::size_t> corner() const {
-    return where < 3 ? std::optional(static_cast<std::size_t>(where)) : std::nullopt;
-  }
-  [[nodiscard]] std::optional<std::size_t> side() const {
-    return where >= 3 && where < 6 ? std::optional(static_cast<std::size_t>(where - 3))
-                                   : std::nullopt;
-  }
+  PlaceOnTriangle place;
 };
 
 /// Returns the point of the triangle a, b, c nearest to p.
