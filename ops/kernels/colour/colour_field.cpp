@@ -87,7 +87,8 @@ class ColourField::Painter {
   std::vector<DistanceGrids> below_;
 };
 
-/// Colours the leaves on top of each other, from below.
+/// Colours leaves one after the other: those on top of each other from below, so that it still
+/// knows the colour of a group that reaches into the next leaf.
 class ColourField::Painter::ColumnPainter {
  public:
   explicit ColumnPainter(const Painter& painter) : all_(painter), nearest_(painter.bands_.size()) {}
@@ -103,6 +104,7 @@ class ColourField::Painter::ColumnPainter {
         const auto z = static_cast<std::size_t>(std::countr_zero(left));
         const unsigned bit = 1U << z;
         Found found{0, (in_band & bit) != 0, no_triangle};
+        // Of several parts, a voxel takes the triangle of its own.
         const bool alone = found.in_band || all_.parts_ != nullptr;
         const unsigned alike = alone ? bit : left & layers_of_group_[z] & ~in_band;
         left &= ~alike;
