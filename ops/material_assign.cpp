@@ -11,6 +11,7 @@
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/split_tiles.h"
 #include "ops/kernels/printing/depth_bands.h"
+#include "vdbdither/engine/history.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
@@ -56,8 +57,12 @@ class MaterialAssign : public Filter {
     }
     if (material_.empty() && parts_.empty() && shell_.empty() && in.grids.contains(colour_grid) &&
         canMixColours(printerProfileOf(in).materials)) {
-      colours_ = halftone();
-      return colours_->plan(in);
+      const OperatorInfo& halftone = findOperator("halftone");
+      Options options;
+      colours_ = made(halftone, options);
+      Schema out = colours_->plan(in);
+      addToHistory(out, halftone.name, options);
+      return out;
     }
     if (!parts_.empty()) findGrid<Int32Grid>(in.grids, part_grid);
     planTable(in);
@@ -75,6 +80,8 @@ class MaterialAssign : public Filter {
     if (!parts_.empty()) reads.push_back({part_grid, Reach::point()});
     return reads;
   }
+
+  [[nodiscard]] bool keepsHistory() const override { return colours_ != nullptr; }
 
   [[nodiscard]] double memoryBytes() const override {
     return colours_ ? colours_->memoryBytes() : 0;
@@ -104,9 +111,10 @@ class MaterialAssign : public Filter {
   }
 
  private:
-  /// The operator that chooses materials for colours, with the defaults of its options.
-  [[nodiscard]] std::unique_ptr<Filter> halftone() const {
-    std::unique_ptr<Operator> made = findOperator("halftone").make();
+  /// Makes another operator, with the defaults of its options.
+  [[nodiscard]] std::unique_ptr<Filter> made(const OperatorInfo& info, Options& options) {
+    std::unique_ptr<Operator> made = info.make();
+    made->declare(options);
     made->setReporter(&report());
     return std::unique_ptr<Filter>(&dynamic_cast<Filter&>(*made.release()));
   }

@@ -13,6 +13,7 @@
 
 #include <openvdb/tools/Prune.h>
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 namespace vdbdither {
@@ -186,8 +187,9 @@ std::vector<SpanImage> slice(const Grid& grid, const SliceLayout& layout, ZRange
         .subspan(static_cast<std::size_t>((z - aligned.begin) / leaf_layers) * strip_count,
                  strip_count);
   };
+  tbb::enumerable_thread_specific<StripBuilder> builders;
   tbb::parallel_for(0, strip_count, [&](int strip) {
-    StripBuilder builder;
+    StripBuilder& builder = builders.local();
     for (int z = aligned.begin; z < aligned.end; z += leaf_layers)
       stripsAt(z)[strip] = walkStrip(grid, layout, y_begin + strip * leaf_layers, z, builder);
   });

@@ -58,6 +58,18 @@ class History(ProgramTest):
                 self.succeed("dither", "-i", "part.vdb", *words.split(), "-o", "x.vdb", "--overwrite")
                 self.assertTrue(self.arguments("x.vdb", "dither").startswith(f"--preset {recorded}"), self.history("x.vdb"))
 
+    def test_colours_are_recorded_as_the_halftone_that_chose_their_materials(self):
+        (self.folder / "part.obj").write_text("".join(f"v {x} {y} {z} 0.8 0.3 0.1\n" for x in (0, 1) for y in (0, 1) for z in (0, 1)) +
+                                              "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n")
+        (self.folder / "jet.json").write_text(json.dumps({
+            "name": "jet", "title": "Jet", "source": "By definition", "technology": "jetting", "pitch_mm": [0.1, 0.1, 0.1],
+            "materials": [{"name": name, "rgba": rgba} for name, rgba in (("white", [255, 255, 255, 255]), ("black", [0, 0, 0, 255]))]}))
+        self.succeed("mesh2sdf", "part.obj", "--printer", "jet.json", "--colour", "!", "dither", "!", "material-assign", "-o", "x.vdb")
+        self.assertEqual(self.arguments("x.vdb", "halftone"),
+                         "--black 0.5 --white media --intent relative --black-point compensated --core white --mask blue --size 0,0,0 --seed 1")
+        self.assertEqual([line.split()[0] for line in self.history("x.vdb")], ["mesh2sdf", "dither", "halftone"])
+        self.assert_runs_again("x.vdb")
+
     def test_names_of_any_kind_run_again(self):
         name = "a part's\n\x1b[1m#1 \\x.stl"
         (self.folder / "part.stl").rename(self.folder / name)

@@ -27,6 +27,10 @@ class Operator : public Verb {
   /// grids in `Slab::inputs`; sources and sinks read them on their own.
   [[nodiscard]] virtual std::vector<Input*> inputs() { return {}; }
 
+  /// Whether it added to the history in `plan` what made its grids, so that its own line is left
+  /// out. For an operator that leaves its work to another. Asked after `plan`.
+  [[nodiscard]] virtual bool keepsHistory() const { return false; }
+
   /// Bytes that it holds besides slabs and inputs.
   [[nodiscard]] virtual double memoryBytes() const { return 0; }
 

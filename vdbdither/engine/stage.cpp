@@ -22,7 +22,8 @@ StagePlan Stage::plan(const Schema& in) {
                            : StagePlan::Kind::sink;
     plan.schema = planOperator(in, plan.reads);
     plan.arguments = options_.canonical();  // now, as the operator may have resolved values
-    if (!info_.transport && !sink()) addToHistory(plan.schema, info_.name, options_);
+    if (!info_.transport && !sink() && !operator_->keepsHistory())
+      addToHistory(plan.schema, info_.name, options_);
     plan.is_barrier = operator_->isBarrier() || widest(plan.reads).whole;
     plan.memory_bytes = operator_->memoryBytes();
     for (const Input* input : operator_->inputs()) {

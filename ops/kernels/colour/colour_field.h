@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ops/kernels/colour/solid_colours.h"
+#include "ops/kernels/colour/voxel_groups.h"
 #include "ops/kernels/distance/mesh_distance.h"
 #include "ops/kernels/mesh/solid_mesh.h"
 #include "vdbdither/model/lattice.h"
@@ -22,8 +23,8 @@ struct ColourGrids {
 ///
 /// A voxel has a colour if it is active in the distance band and at most a voxel diagonal outside,
 /// or if it is inside and at most `depth_mm` below the surface. In the band the nearest point is
-/// exact. Below it, one search serves `layersOfSearch()` voxels on top of each other: the colour is
-/// that of the point nearest to the middle one. The result depends on neither the division of the
+/// exact. Below it, one search serves a group of voxels: the colour is that of the point nearest to
+/// the middle of the group. The result depends on neither the division of the
 /// layers nor the number of threads.
 class ColourField {
  public:
@@ -44,9 +45,8 @@ class ColourField {
   [[nodiscard]] ColourGrids run(std::span<const DistanceGrids> bands,
                                 const openvdb::Int32Grid* parts, ZRange core) const;
 
-  /// The number of layers, odd, for which the voxels below the band are searched once: as many as
-  /// lie within half of the longest edge of a voxel from the middle one.
-  [[nodiscard]] int layersOfSearch() const { return layers_; }
+  /// The voxels below the band that share a search.
+  [[nodiscard]] const VoxelGroups& groups() const { return groups_; }
 
   [[nodiscard]] double memoryBytes() const;
 
@@ -62,7 +62,8 @@ class ColourField {
   Lattice lattice_;
   double depth_mm_;
   double tie_mm_;
-  int layers_;
+  VoxelGroups groups_;
+  Lattice middles_;  ///< of the groups
   std::vector<Solid> solids_;
 };
 

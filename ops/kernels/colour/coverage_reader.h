@@ -21,10 +21,15 @@ class CoverageReader {
   /// Goes to the leaf at `origin`. Returns whether some of its voxels have coverages.
   virtual bool visit(const openvdb::Coord& origin) = 0;
 
-  /// Sets `coverages`, one for each material, ≥ 0 and of sum 1 to 1e-6, to those of a voxel of the
-  /// visited leaf, and returns true; returns false if the voxel has none. Throws DataError for
-  /// values that are no coverages.
-  virtual bool read(unsigned offset, std::span<float> coverages) = 0;
+  /// Returns a bit for each voxel of a column of the visited leaf, from below, that has coverages.
+  /// @param column  the offset of the lowest voxel
+  [[nodiscard]] virtual unsigned layersWith(unsigned column) const = 0;
+
+  /// Sets `coverages`, one for each material, ≥ 0 and of sum 1 to 1e-6, to those of the lowest of
+  /// some voxels of a column, and returns those of `layers` that are known to have the same, this
+  /// one among them. Throws DataError for values that are no coverages.
+  /// @param layers  one or more of layersWith(column)
+  virtual unsigned read(unsigned column, unsigned layers, std::span<float> coverages) = 0;
 };
 
 /// Where coverages come from. Safe to use from many threads.

@@ -4,6 +4,8 @@
 #include "ops/kernels/colour/halftone.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <memory>
 #include <numeric>
 
@@ -20,6 +22,43 @@ using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using openvdb::Int32Tree;
 
+namespace {
+
+using Int32Leaf = Int32Tree::LeafNodeType;
+
+/// The parts of the interval from 0 to 1 that materials have.
+class Intervals {
+ public:
+  /// @param order  of the materials: indices in `coverages`
+  void set(std::span<const std::size_t> order, std::span<const float> coverages) {
+    materials_.clear();
+    ends_.clear();
+    float end = 0;
+    for (const std::size_t material : order) {
+      if (coverages[material] == 0) continue;
+      end += coverages[material];
+      materials_.push_back(static_cast<std::int32_t>(material) + 1);
+      ends_.push_back(end);
+    }
+    // The last takes what is left: sums of single precision may stay below a threshold.
+    ends_.pop_back();
+  }
+
+  /// Returns the material whose part holds a threshold, counted from 1. It counts rather than
+  /// searches, because nobody can foresee where a search ends.
+  [[nodiscard]] std::int32_t at(float threshold) const {
+    std::size_t before = 0;
+    for (const float end : ends_) before += end <= threshold ? 1 : 0;
+    return materials_[before];
+  }
+
+ private:
+  std::vector<std::int32_t> materials_;
+  std::vector<float> ends_;  ///< of all but the last
+};
+
+}  // namespace
+
 Int32Tree::Ptr Halftone::run(const openvdb::BoolTree& solid, const CoverageSource& source,
                              std::int32_t bare, ZRange core) const {
   Int32Tree::Ptr material = valueWhereActive(solid, bare);
@@ -34,24 +73,31 @@ Int32Tree::Ptr Halftone::run(const openvdb::BoolTree& solid, const CoverageSourc
     const auto reader = source.reader();
     splitTiles(*material, [&](const Coord& origin) { return reader->visit(origin); });
   }
-  std::vector<Int32Tree::LeafNodeType*> leaves;
+  std::vector<Int32Leaf*> leaves;
   material->getNodes(leaves);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size()), [&](const auto& range) {
     const auto reader = source.reader();
     std::vector<float> coverages(order_.size());
+    Intervals intervals;
+    std::array<float, leaf_layers> thresholds;
     for (std::size_t n = range.begin(); n != range.end(); ++n) {
-      Int32Tree::LeafNodeType& leaf = *leaves[n];
+      Int32Leaf& leaf = *leaves[n];
       if (!reader->visit(leaf.origin())) continue;
       std::int32_t* values = leaf.buffer().data();
-      for (auto voxel = leaf.cbeginValueOn(); voxel; ++voxel) {
-        if (!reader->read(voxel.pos(), coverages)) continue;
-        const float threshold = mask_(voxel.getCoord());
-        // The last takes what is left: sums of single precision may stay below the threshold.
-        std::size_t place = 0;
-        float sum = coverages[order_[0]];
-        while (sum <= threshold && place + 1 < order_.size()) sum += coverages[order_[++place]];
-        while (place > 0 && coverages[order_[place]] == 0) --place;
-        values[voxel.pos()] = static_cast<std::int32_t>(order_[place]) + 1;
+      for (unsigned column = 0; column < Int32Leaf::SIZE; column += leaf_layers) {
+        unsigned layers = leaf.getValueMask().getWord<std::uint8_t>(column / leaf_layers);
+        if (layers != 0) layers &= reader->layersWith(column);
+        if (layers == 0) continue;
+        mask_.column(leaf.offsetToGlobalCoord(column), thresholds);
+        while (layers != 0) {
+          const unsigned alike = reader->read(column, layers, coverages);
+          intervals.set(order_, coverages);
+          layers &= ~alike;
+          for (unsigned left = alike; left != 0; left &= left - 1) {
+            const auto z = static_cast<unsigned>(std::countr_zero(left));
+            values[column + z] = intervals.at(thresholds[z]);
+          }
+        }
       }
     }
   });
@@ -95,12 +141,15 @@ std::vector<FloatGrid::Ptr> coverageGrids(const openvdb::Vec3SGrid& colour,
         std::fill_n(leaves[n]->buffer().data(), Leaf::SIZE, 0.0F);
       }
       const std::uint8_t within = rowWithin(origins[n].z(), core);
-      for (unsigned offset = 0; offset < Leaf::SIZE; ++offset) {
-        if ((within >> offset % leaf_layers & 1U) == 0 || !reader->read(offset, coverages))
-          continue;
-        for (std::size_t ink = 0; ink < inks; ++ink)
-          made[ink][n]->setValueOn(offset, coverages[ink]);
-      }
+      for (unsigned column = 0; column < Leaf::SIZE; column += leaf_layers)
+        for (unsigned layers = within & reader->layersWith(column); layers != 0;) {
+          const unsigned alike = reader->read(column, layers, coverages);
+          layers &= ~alike;
+          for (unsigned left = alike; left != 0; left &= left - 1)
+            for (std::size_t ink = 0; ink < inks; ++ink)
+              made[ink][n]->setValueOn(column + static_cast<unsigned>(std::countr_zero(left)),
+                                       coverages[ink]);
+        }
     }
   });
   std::vector<FloatGrid::Ptr> grids;

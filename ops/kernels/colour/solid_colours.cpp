@@ -91,7 +91,7 @@ Vec4f SolidColours::at(std::uint32_t triangle, const Vec3d& p_mm) const {
       std::lower_bound(fillings_.begin(), fillings_.end(), triangle,
                        [](const Filling& one, std::uint32_t t) { return one.triangle < t; });
   const auto& [a, b, c] = filling->corners_mm;
-  return mixed(filling->colours, weightsOf(a, b, c, nearestOnTriangle(a, b, c, p_mm)));
+  return mixed(filling->colours, nearestPlace(a, b, c, p_mm).weights);
 }
 
 double SolidColours::memoryBytes() const {

@@ -123,7 +123,7 @@ Vec4f SurfaceColours::at(std::uint32_t triangle, const Vec3d& p_mm) const {
   const Vec3d& a = vertices_[triangles_[triangle][0]];
   const Vec3d& b = vertices_[triangles_[triangle][1]];
   const Vec3d& c = vertices_[triangles_[triangle][2]];
-  const CornerWeights weights = weightsOf(a, b, c, nearestOnTriangle(a, b, c, p_mm));
+  const CornerWeights weights = nearestPlace(a, b, c, p_mm).weights;
   if (!appearance.colours.empty()) colour *= mixed(appearance.colours[within], weights);
   if (textured && !appearance.coordinates.empty()) {
     Vec4f texel = source.textures[material.texture].sample(

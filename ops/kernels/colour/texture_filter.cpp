@@ -118,30 +118,75 @@ Colour texelAt(const Texture& image, std::int64_t x, std::int64_t y,
                                wrappedTexel(x, image.width, wrap[0])]);
 }
 
-Colour interpolated(const Texture& image, double u, double v,
+/// Four texels that are neighbours, and what lies between them.
+struct Cell {
+  Colour upper_left, upper_right, lower_left, lower_right;
+
+  /// @param right  from the middle of the left texels to that of the right ones, 0 … 1
+  /// @param lower  from the middle of the upper texels to that of the lower ones
+  [[nodiscard]] Colour at(float right, float lower) const {
+    const Colour above = upper_left * (1 - right) + upper_right * right;
+    const Colour below = lower_left * (1 - right) + lower_right * right;
+    return above * (1 - lower) + below * lower;
+  }
+  /// How much the colour differs from one that is linear, for each unit of right · lower.
+  [[nodiscard]] Colour twist() const { return upper_left - upper_right - lower_left + lower_right; }
+};
+
+/// The cell whose upper left texel is at a place. All four lie in the image.
+Cell cellWithin(const Texture& image, std::int32_t column, std::int32_t row) {
+  const Texture::Texel* texel = image.texels.data() + static_cast<std::size_t>(row) * image.width +
+                                static_cast<std::size_t>(column);
+  return {colourOf(texel[0]), colourOf(texel[1]), colourOf(texel[image.width]),
+          colourOf(texel[image.width + 1])};
+}
+
+/// Interpolates at x, y in texels from the middle of the first one. All texels lie in the image.
+Colour interpolatedWithin(const Texture& image, double x, double y) {
+  const auto column = static_cast<std::int32_t>(x);
+  const auto row = static_cast<std::int32_t>(y);
+  return cellWithin(image, column, row)
+      .at(static_cast<float>(x - column), static_cast<float>(y - row));
+}
+
+/// The same anywhere.
+Colour interpolated(const Texture& image, double x, double y,
                     const std::array<TextureWrap, 2>& wrap) {
-  const double x = u * image.width - 0.5;
-  const double y = v * image.height - 0.5;
   const std::int64_t column = wholeOf(x);
   const std::int64_t row = wholeOf(y);
-  const auto right = static_cast<float>(x - static_cast<double>(column));
-  const auto lower = static_cast<float>(y - static_cast<double>(row));
-  std::array<Colour, 4> corners;
-  const bool is_within = column >= 0 && column + 1 < std::int64_t{image.width} && row >= 0 &&
-                         row + 1 < std::int64_t{image.height};
-  if (is_within) {
-    const Texture::Texel* texel = image.texels.data() +
-                                  static_cast<std::size_t>(row) * image.width +
-                                  static_cast<std::size_t>(column);
-    corners = {colourOf(texel[0]), colourOf(texel[1]), colourOf(texel[image.width]),
-               colourOf(texel[image.width + 1])};
-  } else {
-    corners = {texelAt(image, column, row, wrap), texelAt(image, column + 1, row, wrap),
-               texelAt(image, column, row + 1, wrap), texelAt(image, column + 1, row + 1, wrap)};
-  }
-  const Colour above = corners[0] * (1 - right) + corners[1] * right;
-  const Colour below = corners[2] * (1 - right) + corners[3] * right;
-  return above * (1 - lower) + below * lower;
+  const Cell cell{texelAt(image, column, row, wrap), texelAt(image, column + 1, row, wrap),
+                  texelAt(image, column, row + 1, wrap), texelAt(image, column + 1, row + 1, wrap)};
+  return cell.at(static_cast<float>(x - static_cast<double>(column)),
+                 static_cast<float>(y - static_cast<double>(row)));
+}
+
+/// The mean of the samples of a footprint around a point, in texels from the middle of the first.
+template <class ColourAt>
+Colour meanOf(const TextureFootprint& footprint, const Vec2d& middle, const ColourAt& colour_at) {
+  const auto [along, across] = footprint.samples;
+  const auto& [step, side_step] = footprint.step;
+  const Vec2d first = middle - 0.5 * Vec2d(step * static_cast<float>(along - 1) +
+                                           side_step * static_cast<float>(across - 1));
+  Colour sum{};
+  for (int i = 0; i < along; ++i)
+    for (int j = 0; j < across; ++j)
+      sum += colour_at(first.x() + i * double{step.x()} + j * double{side_step.x()},
+                       first.y() + i * double{step.y()} + j * double{side_step.y()});
+  return sum / static_cast<float>(along * across);
+}
+
+/// The same of samples from `low` to `high`, all within the image.
+Colour meanWithin(const Texture& image, const TextureFootprint& footprint, const Vec2d& middle,
+                  const Vec2d& low, const Vec2d& high) {
+  const auto column = static_cast<std::int32_t>(low.x());
+  const auto row = static_cast<std::int32_t>(low.y());
+  if (static_cast<std::int32_t>(high.x()) != column || static_cast<std::int32_t>(high.y()) != row)
+    return meanOf(footprint, middle,
+                  [&](double x, double y) { return interpolatedWithin(image, x, y); });
+  // In one cell the mean is known from the middle.
+  const Cell cell = cellWithin(image, column, row);
+  return cell.at(static_cast<float>(middle.x() - column), static_cast<float>(middle.y() - row)) +
+         cell.twist() * footprint.covariance;
 }
 
 }  // namespace
@@ -205,32 +250,45 @@ TextureFootprint FilteredTexture::footprint(const std::array<Vec2d, 3>& edges) c
     return static_cast<std::uint8_t>(std::clamp(wanted, least, 255.0));
   };
   made.samples = {samples(along), samples(std::min(across, along))};
-  made.side = {Vec2f(static_cast<float>(axis.x() * along / width),
-                     static_cast<float>(axis.y() * along / height)),
-               Vec2f(static_cast<float>(-axis.y() * across / width),
-                     static_cast<float>(axis.x() * across / height))};
+  const Vec2d scale(level(made.level).width / width, level(made.level).height / height);
+  const auto step = [&](const Vec2d& side, std::size_t n) {
+    return Vec2f(side * scale / static_cast<double>(made.samples[n]));
+  };
+  made.step = {step(axis * along, 0), step(Vec2d(-axis.y(), axis.x()) * across, 1)};
+  for (std::size_t n = 0; n < 2; ++n) {
+    const auto count = static_cast<float>(made.samples[n]);
+    const Vec2f& one = made.step[n];
+    made.reach += 0.5F * (count - 1) * Vec2f(std::abs(one.x()), std::abs(one.y()));
+    // The variance of numbers with equal steps of 1.
+    made.covariance += (count * count - 1) / 12 * one.x() * one.y();
+  }
   return made;
 }
 
 Vec4f FilteredTexture::sample(const Vec2f& at, const TextureFootprint& footprint,
                               const std::array<TextureWrap, 2>& wrap, bool is_smooth) const {
   const Texture& image = level(footprint.level);
-  const bool is_interpolated = is_smooth || footprint.level > 0;
-  Colour sum{};
-  for (int i = 0; i < footprint.samples[0]; ++i) {
-    const double along = (i + 0.5) / footprint.samples[0] - 0.5;
-    for (int j = 0; j < footprint.samples[1]; ++j) {
-      const double across = (j + 0.5) / footprint.samples[1] - 0.5;
-      const double u = at.x() + footprint.side[0].x() * along + footprint.side[1].x() * across;
-      const double v = at.y() + footprint.side[0].y() * along + footprint.side[1].y() * across;
-      sum += is_interpolated
-                 ? interpolated(image, u, v, wrap)
-                 : texelAt(image, wholeOf(u * image.width), wholeOf(v * image.height), wrap);
-    }
+  const Vec2d middle(double{at.x()} * image.width - 0.5, double{at.y()} * image.height - 0.5);
+  const Vec2d low = middle - Vec2d(footprint.reach);
+  const Vec2d high = middle + Vec2d(footprint.reach);
+  constexpr double rounding = 0.01;
+  const bool is_within = low.x() >= rounding && low.y() >= rounding &&
+                         high.x() + rounding < image.width - 1.0 &&
+                         high.y() + rounding < image.height - 1.0;
+  Colour mean;
+  if (!is_smooth && footprint.level == 0) {
+    mean = meanOf(footprint, middle, [&](double x, double y) {
+      return texelAt(image, wholeOf(x + 0.5), wholeOf(y + 0.5), wrap);
+    });
+  } else if (is_within) {
+    mean = meanWithin(image, footprint, middle, low, high);
+  } else {
+    mean = meanOf(footprint, middle,
+                  [&](double x, double y) { return interpolated(image, x, y, wrap); });
   }
   constexpr float whole = 65535;
-  sum /= whole * static_cast<float>(footprint.samples[0] * footprint.samples[1]);
-  return {sum[0], sum[1], sum[2], sum[3]};
+  mean /= whole;
+  return {mean[0], mean[1], mean[2], mean[3]};
 }
 
 }  // namespace vdbdither

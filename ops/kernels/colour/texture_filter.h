@@ -12,12 +12,15 @@
 
 namespace vdbdither {
 
-/// The part of a texture that is averaged for one point of a surface: a parallelogram, measured in
-/// shares of the texture's width and height.
+/// The part of a texture that is averaged for one point of a surface: samples in a parallelogram
+/// around it.
 struct TextureFootprint {
   std::uint8_t level = 0;                     ///< of the pyramid
   std::array<std::uint8_t, 2> samples{1, 1};  ///< along each side
-  std::array<openvdb::Vec2f, 2> side{};       ///< from one corner to the next
+  // In texels of the level.
+  std::array<openvdb::Vec2f, 2> step{};  ///< to the next sample
+  openvdb::Vec2f reach{0, 0};            ///< from the middle to the samples farthest from it
+  float covariance = 0;                  ///< of the places of the samples along u and v
 };
 
 /// A texture with smaller copies of itself, each half as wide and as high, for averages.

@@ -185,15 +185,15 @@ void MeshDistance::Block::lower(MeshFeatures::Id id, double band_mm) {
 }
 
 LeafBits MeshDistance::Block::existing(const Coord& origin) const {
-  LeafBits bits;
-  bits.fill(~0ULL);
-  if (voxels_.isInside(CoordBBox::createCube(origin, edge))) return bits;
-  bits.fill(0);
-  for (const Coord& ijk : CoordBBox::createCube(origin, edge)) {
-    const Coord at = ijk - origin;
-    if (voxels_.isInside(ijk))
-      bits[static_cast<std::size_t>(at.x())] |= 1ULL << (edge * at.y() + at.z());
-  }
+  const auto within = [&](int axis) {
+    return rowWithin(origin[axis], {voxels_.min()[axis], voxels_.max()[axis] + 1});
+  };
+  std::uint64_t plane = 0;
+  for (std::uint64_t rows = within(1); rows != 0; rows &= rows - 1)
+    plane |= std::uint64_t{within(2)} << (edge * std::countr_zero(rows));
+  LeafBits bits{};
+  for (unsigned planes = within(0); planes != 0; planes &= planes - 1)
+    bits[static_cast<std::size_t>(std::countr_zero(planes))] = plane;
   return bits;
 }
 

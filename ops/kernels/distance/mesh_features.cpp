@@ -441,8 +441,8 @@ MeshFeatures::Nearest MeshFeatures::nearest(Id id, const Vec3d& p) const {
   if (id.kind() == Kind::vertex) return atVertex(id.index());
   if (id.kind() == Kind::edge) return atEdge(id.index());
   const std::uint32_t triangle = id.index();
-  const PointOnTriangle at =
-      nearestOnTriangle(corner(triangle, 0), corner(triangle, 1), corner(triangle, 2), p);
+  const PlaceOnTriangle at =
+      nearestPlace(corner(triangle, 0), corner(triangle, 1), corner(triangle, 2), p);
   if (at.corner()) return atVertex(mesh_.triangles[triangle][*at.corner()]);
   if (at.side()) return atEdge(side_edges_[3 * triangle + *at.side()]);
   const Vec3d& n = normals_[triangle];

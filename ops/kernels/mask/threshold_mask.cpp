@@ -86,4 +86,22 @@ float ThresholdMask::operator()(const Coord& ijk) const {
   return values_[axes_[0](ijk.x()) + axes_[1](ijk.y()) + axes_[2](ijk.z())];
 }
 
+void ThresholdMask::column(const Coord& ijk, std::span<float> thresholds) const {
+  if (values_.empty()) {
+    Coord at = ijk;
+    for (float& threshold : thresholds) {
+      threshold = (*this)(at);
+      ++at.z();
+    }
+    return;
+  }
+  const float* values = values_.data() + axes_[0](ijk.x()) + axes_[1](ijk.y());
+  const auto period = static_cast<std::size_t>(axes_[2].period);
+  std::size_t z = axes_[2](ijk.z());
+  for (float& threshold : thresholds) {
+    threshold = values[z];
+    if (++z == period) z = 0;
+  }
+}
+
 }  // namespace vdbdither

@@ -38,6 +38,9 @@ class ThresholdMask {
   /// Returns M at an absolute index, which may be negative.
   [[nodiscard]] float operator()(const openvdb::Coord& ijk) const;
 
+  /// Sets `thresholds` to those of voxels on top of each other, the lowest at `ijk`.
+  void column(const openvdb::Coord& ijk, std::span<float> thresholds) const;
+
  private:
   ThresholdMask() = default;
 

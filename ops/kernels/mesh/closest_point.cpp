@@ -39,30 +39,55 @@ float roundedUp(double value) { return -roundedDown(-value); }
 
 }  // namespace
 
-PointOnTriangle nearestOnTriangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
+PlaceOnTriangle nearestPlace(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
   const Vec3d ab = b - a;
   const Vec3d ac = c - a;
   const Vec3d ap = p - a;
   const double d1 = ab.dot(ap);
   const double d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return {a, 0};
+  if (d1 <= 0 && d2 <= 0) return {0, {1, 0, 0}};
   const Vec3d bp = p - b;
   const double d3 = ab.dot(bp);
   const double d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return {b, 1};
+  if (d3 >= 0 && d4 <= d3) return {1, {0, 1, 0}};
   const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return {a + ab * (d1 / (d1 - d3)), 3};
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
+    const double along = d1 / (d1 - d3);
+    return {3, {1 - along, along, 0}};
+  }
   const Vec3d cp = p - c;
   const double d5 = ab.dot(cp);
   const double d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return {c, 2};
+  if (d6 >= 0 && d5 <= d6) return {2, {0, 0, 1}};
   const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return {a + ac * (d2 / (d2 - d6)), 5};
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
+    const double along = d2 / (d2 - d6);
+    return {5, {1 - along, 0, along}};
+  }
   const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
-    return {b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), 4};
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    const double along = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return {4, {0, 1 - along, along}};
+  }
   const double sum = va + vb + vc;
-  return {a + ab * (vb / sum) + ac * (vc / sum), 6};
+  if (!(sum > 0)) return {6, {1, 0, 0}};  // a triangle without an area
+  return {6, {va / sum, vb / sum, vc / sum}};
+}
+
+PointOnTriangle nearestOnTriangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
+  const PlaceOnTriangle place = nearestPlace(a, b, c, p);
+  switch (place.where) {
+    case 0:
+      return {a, place};
+    case 1:
+      return {b, place};
+    case 2:
+      return {c, place};
+    case 4:
+      return {b + (c - b) * place.weights[2], place};
+    default:
+      return {a + (b - a) * place.weights[1] + (c - a) * place.weights[2], place};
+  }
 }
 
 struct ClosestPoints::Candidate {
@@ -185,8 +210,8 @@ ClosestPoint ClosestPoints::operator()(const Vec3d& p, std::uint32_t hint) const
   }
 
   const Mesh::Triangle& t = mesh_.triangles[best.triangle];
-  const auto corner = best.at.corner();
-  const auto side = best.at.side();
+  const auto corner = best.at.place.corner();
+  const auto side = best.at.place.side();
   const Vec3d& normal = corner ? vertex_normals_[t[*corner]]
                         : side ? edge_normals_[3 * std::size_t{best.triangle} + *side]
                                : normals_[best.triangle];

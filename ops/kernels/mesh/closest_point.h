@@ -12,10 +12,13 @@
 
 namespace vdbdither {
 
-/// The nearest point of a triangle to a given one.
-struct PointOnTriangle {
-  openvdb::Vec3d point;
+/// The shares of the corners of a triangle in a point of it; they sum to 1.
+using CornerWeights = std::array<double, 3>;
+
+/// Where the nearest point of a triangle to a given one lies.
+struct PlaceOnTriangle {
   int where;  ///< 0–2: a corner; 3–5: the side from corner n − 3; 6: the face
+  CornerWeights weights;
 
   [[nodiscard]] std::optional<std::size_t> corner() const {
     return where < 3 ? std::optional(static_cast<std::size_t>(where)) : std::nullopt;
@@ -26,7 +29,17 @@ struct PointOnTriangle {
   }
 };
 
-/// Returns the point of the triangle a, b, c nearest to p (Ericson 2005, 5.1.5).
+/// Returns where the point of the triangle a, b, c nearest to p lies (Ericson 2005, 5.1.5).
+PlaceOnTriangle nearestPlace(const openvdb::Vec3d& a, const openvdb::Vec3d& b,
+                             const openvdb::Vec3d& c, const openvdb::Vec3d& p);
+
+/// The nearest point of a triangle to a given one.
+struct PointOnTriangle {
+  openvdb::Vec3d point;
+  PlaceOnTriangle place;
+};
+
+/// Returns the point of the triangle a, b, c nearest to p.
 PointOnTriangle nearestOnTriangle(const openvdb::Vec3d& a, const openvdb::Vec3d& b,
                                   const openvdb::Vec3d& c, const openvdb::Vec3d& p);
 

@@ -222,8 +222,8 @@ TEST_P(ColourFieldOn, ColoursComeFromTheNearestPointOfTheSurface) {
     const ColourGrids grids = part.run();
     const DistanceGrids band = part.distances.front().run(part.lattice.layers());
     // How far the middle of the voxels that share a search may lie away.
-    const double off_mm = part.field.layersOfSearch() / 2 * pitch_mm.z();
-    EXPECT_LE(off_mm, 0.5 * std::max({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()}) + 1e-9);
+    const double off_mm = part.field.groups().offMm();
+    EXPECT_LT(off_mm, 0.5 * std::max({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()}));
     std::mt19937 random(13);
     int below = 0;
     for (auto it = part.lattice.box.begin(); it; ++it) {
