@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include <openvdb/openvdb.h>
@@ -28,8 +27,9 @@ class HeightKernel {
   /// The voxels of one column along z within the reach, around the one in the middle.
   struct Column {
     int x, y;
-    int z;          ///< the column holds −z … z
-    float across2;  ///< (Δx/σ_x)² + (Δy/σ_y)²
+    int z;  ///< the column holds −z … z
+    /// (|Δ|/σ)² of its voxels, from −z on; then values of weight zero, for reading by eight.
+    std::vector<float> apart2;
   };
 
   /// \param pitch_mm  edges of the voxels
@@ -45,23 +45,21 @@ class HeightKernel {
 
   [[nodiscard]] const std::vector<Column>& columns() const { return columns_; }
 
-  /// (Δz/σ_z)² of the voxels of a column, by four; beyond the column, a value of weight zero.
-  [[nodiscard]] const std::vector<Floats>& along2(int z) const {
-    return along2_[static_cast<std::size_t>(z)];
-  }
-
   /// The weights of one hill by x = |Δ|² − (d_v − d_w)² in units of σ². Negative x, which distances
   /// from different facets can give, count as zero.
   struct Hill {
     float slope;
     float factor;
 
-    [[nodiscard]] Floats operator()(Floats x) const {
-      Floats w = greaterOf(1.0F - greaterOf(x, Floats{}) * slope, Floats{});
+    /// Sets `w` to the weights; `Lanes` is Floats or EightFloats.
+    template <typename Lanes>
+    [[gnu::always_inline]] void weigh(const Lanes& x, Lanes& w) const {
+      w = 1.0F - (x > 0.0F ? x : Lanes{}) * slope;
+      w = w > 0.0F ? w : Lanes{};
       w *= w;
       w *= w;
       w *= w;
-      return factor * w;
+      w *= factor;
     }
   };
   [[nodiscard]] const std::vector<Hill>& hills() const { return hills_; }
@@ -69,7 +67,6 @@ class HeightKernel {
  private:
   openvdb::Coord reach_;
   std::vector<Column> columns_;
-  std::array<std::vector<Floats>, maximum_reach + 1> along2_;
   std::vector<Hill> hills_;
 };
 
