@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include <openvdb/openvdb.h>
@@ -27,9 +28,8 @@ class HeightKernel {
   /// The voxels of one column along z within the reach, around the one in the middle.
   struct Column {
     int x, y;
-    int z;  ///< the column holds −z … z
-    /// (|Δ|/σ)² of its voxels, from −z on; then values of weight zero, for reading by eight.
-    std::vector<float> apart2;
+    int z;                 ///< the column holds −z … z
+    std::uint32_t apart2;  ///< the index of that of −z
   };
 
   /// \param pitch_mm  edges of the voxels
@@ -44,6 +44,10 @@ class HeightKernel {
   [[nodiscard]] const openvdb::Coord& reach() const { return reach_; }
 
   [[nodiscard]] const std::vector<Column>& columns() const { return columns_; }
+
+  /// (|Δ|/σ)² of the voxels of all columns. Those of a column are followed by values of weight
+  /// zero, for reading by eight.
+  [[nodiscard]] const std::vector<float>& apart2() const { return apart2_; }
 
   /// The weights of one hill by x = |Δ|² − (d_v − d_w)² in units of σ². Negative x, which distances
   /// from different facets can give, count as zero.
@@ -65,8 +69,11 @@ class HeightKernel {
   [[nodiscard]] const std::vector<Hill>& hills() const { return hills_; }
 
  private:
+  void addColumn(int x, int y, int z, double across2, double step);
+
   openvdb::Coord reach_;
   std::vector<Column> columns_;
+  std::vector<float> apart2_;
   std::vector<Hill> hills_;
 };
 

@@ -27,53 +27,64 @@ template <typename Lanes>
 
 /// The sum, compiled for each instruction set and number of hills.
 struct OpenSurroundings::Loops {
+  /// Lists the groups that hold voxels, without branches: they would often be foretold wrongly.
+  template <unsigned lanes>
+  [[gnu::always_inline]] static std::size_t listGroups(OpenSurroundings& around, unsigned z) {
+    constexpr std::uint64_t all = (std::uint64_t{1} << lanes) - 1;
+    Group* const groups = around.groups_.data();
+    std::size_t count = 0;
+    for (std::size_t m = 0; m < around.near_count_; ++m) {
+      const Near& near = around.near_[m];
+      const unsigned bottom = z - near.half;
+      std::uint64_t bits = *near.present >> bottom & ((std::uint64_t{2} << (2 * near.half)) - 1);
+      for (unsigned n = 0; n <= 2 * near.half; n += lanes) {
+        groups[count] = {near.first + bottom + n, near.apart2 + n};
+        count += static_cast<std::size_t>((bits & all) != 0);
+        bits >>= lanes;
+      }
+    }
+    return count;
+  }
+
   template <typename Lanes, std::size_t hill_count>
-  [[gnu::always_inline]] static float sumOf(const OpenSurroundings& around, int z, float depth) {
+  [[gnu::always_inline]] static float sumOf(OpenSurroundings& around, unsigned z, float depth) {
     constexpr unsigned lanes = sizeof(Lanes) / sizeof(float);
-    const HeightKernel::Hill* hills = around.kernel_.hills().data();
-    const float* all_depths = around.depths_.data();
-    const float* all_errors = around.errors_.data();
+    const HeightKernel& kernel = around.kernel_;
+    const std::size_t count = listGroups<lanes>(around, z);
     Floats sum{};
-    for (const Near *near = around.near_.data(), *end = near + around.near_count_; near != end;
-         ++near) {
-      const int bottom = z - near->half;
-      const std::size_t first = near->first + static_cast<std::size_t>(bottom);
-      std::uint64_t bits = *near->present >> bottom & ((std::uint64_t{2} << (2 * near->half)) - 1);
-      while (bits != 0) {
-        const auto n = static_cast<unsigned>(std::countr_zero(bits)) & ~(lanes - 1);
-        bits &= ~(((std::uint64_t{1} << lanes) - 1) << n);
-        Lanes apart2, depths, errors, w;
-        load(near->apart2 + n, apart2);
-        load(all_depths + first + n, depths);
-        load(all_errors + first + n, errors);
-        const Lanes deeper = depth - depths;
-        const Lanes x = apart2 - deeper * deeper;
-        hills[0].weigh(x, w);
-        if constexpr (hill_count == 2) {
-          Lanes wide;
-          hills[1].weigh(x, wide);
-          w += wide;
-        }
-        const Lanes terms = errors * w;
-        if constexpr (lanes == 4) {
-          sum += terms;
-        } else {
-          sum += __builtin_shufflevector(terms, terms, 0, 1, 2, 3);
-          sum += __builtin_shufflevector(terms, terms, 4, 5, 6, 7);
-        }
+    for (std::size_t n = 0; n < count; ++n) {
+      const Group& group = around.groups_[n];
+      Lanes apart2, depths, errors, w;
+      load(&kernel.apart2()[group.apart2], apart2);
+      load(&around.depths_[group.voxels], depths);
+      load(&around.errors_[group.voxels], errors);
+      const Lanes deeper = depth - depths;
+      const Lanes x = apart2 - deeper * deeper;
+      kernel.hills()[0].weigh(x, w);
+      if constexpr (hill_count == 2) {
+        Lanes wide;
+        kernel.hills()[1].weigh(x, wide);
+        w += wide;
+      }
+      const Lanes terms = errors * w;
+      if constexpr (lanes == 4) {
+        sum += terms;
+      } else {
+        sum += __builtin_shufflevector(terms, terms, 0, 1, 2, 3);
+        sum += __builtin_shufflevector(terms, terms, 4, 5, 6, 7);
       }
     }
     return (sum[0] + sum[2]) + (sum[1] + sum[3]);
   }
 
   template <std::size_t hill_count>
-  static float sumBaseline(const OpenSurroundings& around, int z, float depth) {
+  static float sumBaseline(OpenSurroundings& around, unsigned z, float depth) {
     return sumOf<Floats, hill_count>(around, z, depth);
   }
 
 #if defined(__x86_64__)
   template <std::size_t hill_count>
-  [[gnu::target("avx2")]] static float sumAvx2(const OpenSurroundings& around, int z, float depth) {
+  [[gnu::target("avx2")]] static float sumAvx2(OpenSurroundings& around, unsigned z, float depth) {
     return sumOf<EightFloats, hill_count>(around, z, depth);
   }
 #endif
@@ -91,7 +102,8 @@ OpenSurroundings::OpenSurroundings(const HeightKernel& kernel, const BlockOrder&
       depths_(present_.size() * stride_),
       errors_(present_.size() * stride_),
       own_column_(no_column),
-      near_(kernel.columns().size() + 1) {
+      near_(kernel.columns().size() + 1),
+      groups_(kernel.apart2().size() / 4 + 1) {
   static_assert(3 * HeightKernel::maximum_reach <= 64, "a column fits into a word");
 #if defined(__x86_64__)
   if (instructions == InstructionSet::avx2)
@@ -163,7 +175,7 @@ void OpenSurroundings::set(const Coord& ijk, const OpenVoxel& voxel) {
 float OpenSurroundings::sum(const Coord& ijk, float depth) {
   const Coord at = ijk - lowest_;
   if (columnOf(at.x(), at.y()) != own_column_) lookAround(at.x(), at.y());
-  return sum_(*this, at.z(), depth);
+  return sum_(*this, static_cast<unsigned>(at.z()), depth);
 }
 
 void OpenSurroundings::lookAround(int x, int y) {
@@ -171,7 +183,8 @@ void OpenSurroundings::lookAround(int x, int y) {
   near_count_ = 0;
   for (const HeightKernel::Column& column : kernel_.columns()) {
     const std::size_t there = columnOf(x + column.x, y + column.y);
-    near_[near_count_] = {column.apart2.data(), &present_[there], there * stride_, column.z};
+    near_[near_count_] = {&present_[there], static_cast<std::uint32_t>(there * stride_),
+                          column.apart2, static_cast<unsigned>(column.z)};
     // Without a branch, which would often be foretold wrongly.
     near_count_ += static_cast<std::size_t>(present_[there] != 0 || there == own_column_);
   }

@@ -33,10 +33,15 @@ class OpenSurroundings {
  private:
   /// A column of the kernel that holds voxels, as seen from a row along z of the block.
   struct Near {
-    const float* apart2;  ///< of HeightKernel::Column
     const std::uint64_t* present;
-    std::size_t first;  ///< the index of its depths and errors
-    int half;           ///< z of HeightKernel::Column
+    std::uint32_t first;   ///< the index of its depths and errors
+    std::uint32_t apart2;  ///< the index of its first |Δ|² in the kernel
+    unsigned half;         ///< z of HeightKernel::Column
+  };
+  /// Voxels of a column that are added up together: indices of the first.
+  struct Group {
+    std::uint32_t voxels;
+    std::uint32_t apart2;
   };
   struct Loops;
 
@@ -49,7 +54,7 @@ class OpenSurroundings {
 
   const HeightKernel& kernel_;
   const BlockOrder& order_;
-  float (*sum_)(const OpenSurroundings& around, int z, float depth);
+  float (*sum_)(OpenSurroundings& around, unsigned z, float depth);
   openvdb::Coord reach_;
   openvdb::Coord edges_;
   openvdb::Coord lowest_;               ///< the voxel at the corner of what is held
@@ -60,6 +65,7 @@ class OpenSurroundings {
   std::size_t own_column_;     ///< that `near_` belongs to
   std::vector<Near> near_;     ///< the columns around it that hold voxels, and itself
   std::size_t near_count_ = 0;
+  std::vector<Group> groups_;  ///< those of the sum that is being made
 };
 
 }  // namespace vdbdither
