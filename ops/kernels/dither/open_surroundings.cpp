@@ -1,5 +1,9 @@
 #include "ops/kernels/dither/open_surroundings.h"
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -15,8 +19,33 @@ namespace {
 
 constexpr std::size_t no_column = std::numeric_limits<std::size_t>::max();
 
-/// Values are read by eight.
-constexpr std::size_t padding = 7;
+/// Voxels, and columns, are read by eight.
+constexpr std::size_t by = 8;
+
+/// Returns a bit for each byte of eight words that is not zero after the shift within its window.
+inline std::uint64_t bytesWithin(const std::uint64_t* words, const std::uint64_t* windows,
+                                 unsigned shift) {
+  std::uint64_t found = 0;
+#ifdef __SSE2__
+  const auto load = [](const std::uint64_t* from) {
+    return _mm_loadu_si128(reinterpret_cast<const __m128i*>(from));
+  };
+  const __m128i count = _mm_cvtsi32_si128(static_cast<int>(shift));
+  for (unsigned n = 0; n < by; n += 2) {
+    const __m128i within = _mm_and_si128(_mm_srl_epi64(load(words + n), count), load(windows + n));
+    const auto zero =
+        static_cast<unsigned>(_mm_movemask_epi8(_mm_cmpeq_epi8(within, _mm_setzero_si128())));
+    found |= std::uint64_t{zero ^ 0xffffU} << (8 * n);
+  }
+#else
+  for (unsigned n = 0; n < by; ++n) {
+    const std::uint64_t within = words[n] >> shift & windows[n];
+    for (unsigned byte = 0; byte < 8; ++byte)
+      found |= std::uint64_t{(within >> (8 * byte) & 0xff) != 0} << (8 * n + byte);
+  }
+#endif
+  return found;
+}
 
 template <typename Lanes>
 [[gnu::always_inline]] inline void load(const float* from, Lanes& values) {
@@ -27,43 +56,45 @@ template <typename Lanes>
 
 /// The sum, compiled for each instruction set and number of hills.
 struct OpenSurroundings::Loops {
-  /// Lists the groups that hold voxels, without branches: they would often be foretold wrongly.
-  template <unsigned lanes>
-  [[gnu::always_inline]] static std::size_t listGroups(OpenSurroundings& around, unsigned z) {
-    constexpr std::uint64_t all = (std::uint64_t{1} << lanes) - 1;
-    Group* const groups = around.groups_.data();
-    std::size_t count = 0;
-    for (std::size_t m = 0; m < around.near_count_; ++m) {
-      const Near& near = around.near_[m];
-      const unsigned bottom = z - near.half;
-      std::uint64_t bits = *near.present >> bottom & ((std::uint64_t{2} << (2 * near.half)) - 1);
-      for (unsigned n = 0; n <= 2 * near.half; n += lanes) {
-        groups[count] = {near.first + bottom + n, near.apart2 + n};
-        count += static_cast<std::size_t>((bits & all) != 0);
-        bits >>= lanes;
-      }
+  template <typename Lanes, std::size_t hill_count>
+  [[gnu::always_inline]] static float sumOf(const OpenSurroundings& around, unsigned z,
+                                            float depth) {
+    const Near& near = around.near_;
+    const HeightKernel::Hill* hills = around.kernel_.hills().data();
+    const float* all_apart2 = around.kernel_.apart2().data();
+    const float* all_depths = around.depths_.data() + z;
+    const float* all_errors = around.errors_.data() + z;
+    Floats sum{};
+    for (std::size_t first = 0; first < near.count; first += by) {
+      forEachBit(bytesWithin(&near.present[first], &near.window[first], z), [&](unsigned found) {
+        const std::size_t column = first + found / 8;
+        const std::size_t group = by * (found % 8);
+        addGroup<Lanes, hill_count>(all_apart2 + near.apart2[column] + group,
+                                    all_depths + near.voxels[column] + group,
+                                    all_errors + near.voxels[column] + group, hills, depth, sum);
+      });
     }
-    return count;
+    return (sum[0] + sum[2]) + (sum[1] + sum[3]);
   }
 
+  /// Adds eight voxels.
   template <typename Lanes, std::size_t hill_count>
-  [[gnu::always_inline]] static float sumOf(OpenSurroundings& around, unsigned z, float depth) {
-    constexpr unsigned lanes = sizeof(Lanes) / sizeof(float);
-    const HeightKernel& kernel = around.kernel_;
-    const std::size_t count = listGroups<lanes>(around, z);
-    Floats sum{};
-    for (std::size_t n = 0; n < count; ++n) {
-      const Group& group = around.groups_[n];
+  [[gnu::always_inline]] static void addGroup(const float* from_apart2, const float* from_depths,
+                                              const float* from_errors,
+                                              const HeightKernel::Hill* hills, float depth,
+                                              Floats& sum) {
+    constexpr std::size_t lanes = sizeof(Lanes) / sizeof(float);
+    for (std::size_t n = 0; n < by; n += lanes) {
       Lanes apart2, depths, errors, w;
-      load(&kernel.apart2()[group.apart2], apart2);
-      load(&around.depths_[group.voxels], depths);
-      load(&around.errors_[group.voxels], errors);
+      load(from_apart2 + n, apart2);
+      load(from_depths + n, depths);
+      load(from_errors + n, errors);
       const Lanes deeper = depth - depths;
       const Lanes x = apart2 - deeper * deeper;
-      kernel.hills()[0].weigh(x, w);
+      hills[0].weigh(x, w);
       if constexpr (hill_count == 2) {
         Lanes wide;
-        kernel.hills()[1].weigh(x, wide);
+        hills[1].weigh(x, wide);
         w += wide;
       }
       const Lanes terms = errors * w;
@@ -74,21 +105,24 @@ struct OpenSurroundings::Loops {
         sum += __builtin_shufflevector(terms, terms, 4, 5, 6, 7);
       }
     }
-    return (sum[0] + sum[2]) + (sum[1] + sum[3]);
   }
 
   template <std::size_t hill_count>
-  static float sumBaseline(OpenSurroundings& around, unsigned z, float depth) {
+  static float sumBaseline(const OpenSurroundings& around, unsigned z, float depth) {
     return sumOf<Floats, hill_count>(around, z, depth);
   }
 
 #if defined(__x86_64__)
   template <std::size_t hill_count>
-  [[gnu::target("avx2")]] static float sumAvx2(OpenSurroundings& around, unsigned z, float depth) {
+  [[gnu::target("avx2")]] static float sumAvx2(const OpenSurroundings& around, unsigned z,
+                                               float depth) {
     return sumOf<EightFloats, hill_count>(around, z, depth);
   }
 #endif
 };
+
+OpenSurroundings::Near::Near(std::size_t columns)
+    : middle(no_column), present(columns), window(columns), voxels(columns), apart2(columns) {}
 
 OpenSurroundings::OpenSurroundings(const HeightKernel& kernel, const BlockOrder& order,
                                    [[maybe_unused]] InstructionSet instructions)
@@ -97,18 +131,18 @@ OpenSurroundings::OpenSurroundings(const HeightKernel& kernel, const BlockOrder&
       sum_(kernel.hills().size() == 1 ? &Loops::sumBaseline<1> : &Loops::sumBaseline<2>),
       reach_(kernel.reach()),
       edges_(order.edges() + reach_ + reach_),
-      stride_(static_cast<std::size_t>(edges_.z()) + padding),
+      stride_(static_cast<std::size_t>(edges_.z()) + by - 1),
       present_(static_cast<std::size_t>(edges_.x() * edges_.y())),
       depths_(present_.size() * stride_),
       errors_(present_.size() * stride_),
-      own_column_(no_column),
-      near_(kernel.columns().size() + 1),
-      groups_(kernel.apart2().size() / 4 + 1) {
-  static_assert(3 * HeightKernel::maximum_reach <= 64, "a column fits into a word");
+      near_(kernel.columns().size() + by) {
+  static_assert(4 * HeightKernel::maximum_reach <= 64, "a column fits into a word, and its shift");
 #if defined(__x86_64__)
   if (instructions == InstructionSet::avx2)
     sum_ = kernel.hills().size() == 1 ? &Loops::sumAvx2<1> : &Loops::sumAvx2<2>;
 #endif
+  for (const HeightKernel::Column& column : kernel.columns())
+    seen_.push_back({column.x * edges_.y() + column.y, column.apart2, column.z});
 }
 
 void OpenSurroundings::clear() {
@@ -121,7 +155,7 @@ void OpenSurroundings::clear() {
 
 void OpenSurroundings::visit(OpenLeaves::Block block, OpenLeaves::Finder& find) {
   clear();
-  own_column_ = no_column;
+  near_.middle = no_column;
   const Coord origin = block.front()->origin;
   lowest_ = order_.cornerOf(origin) - reach_;
   const Coord index = order_.blockOf(origin);
@@ -165,29 +199,43 @@ void OpenSurroundings::read(const OpenLeaf& leaf, const Coord& from) {
 void OpenSurroundings::set(const Coord& ijk, const OpenVoxel& voxel) {
   const Coord at = ijk - lowest_;
   const std::size_t column = columnOf(at.x(), at.y());
-  if (column != own_column_) own_column_ = no_column;
   present_[column] |= std::uint64_t{1} << at.z();
   const std::size_t to = column * stride_ + static_cast<std::size_t>(at.z());
   depths_[to] = voxel.depth;
   errors_[to] = voxel.error;
+  if (column == near_.middle) {
+    near_.present[near_.own] = present_[column] << near_.own_half;
+  } else {
+    near_.middle = no_column;
+  }
 }
 
 float OpenSurroundings::sum(const Coord& ijk, float depth) {
   const Coord at = ijk - lowest_;
-  if (columnOf(at.x(), at.y()) != own_column_) lookAround(at.x(), at.y());
+  const std::size_t column = columnOf(at.x(), at.y());
+  if (column != near_.middle) lookAround(column);
   return sum_(*this, static_cast<unsigned>(at.z()), depth);
 }
 
-void OpenSurroundings::lookAround(int x, int y) {
-  own_column_ = columnOf(x, y);
-  near_count_ = 0;
-  for (const HeightKernel::Column& column : kernel_.columns()) {
-    const std::size_t there = columnOf(x + column.x, y + column.y);
-    near_[near_count_] = {&present_[there], static_cast<std::uint32_t>(there * stride_),
-                          column.apart2, static_cast<unsigned>(column.z)};
+void OpenSurroundings::lookAround(std::size_t column) {
+  near_.middle = column;
+  std::size_t count = 0;
+  for (const Seen& seen : seen_) {
+    const std::size_t there = column + static_cast<std::size_t>(seen.column);
+    if (seen.column == 0) {
+      near_.own = count;
+      near_.own_half = seen.half;
+    }
+    near_.present[count] = present_[there] << seen.half;
+    near_.window[count] = (std::uint64_t{2} << (2 * seen.half)) - 1;
+    near_.voxels[count] = static_cast<std::ptrdiff_t>(there * stride_) - seen.half;
+    near_.apart2[count] = seen.apart2;
     // Without a branch, which would often be foretold wrongly.
-    near_count_ += static_cast<std::size_t>(present_[there] != 0 || there == own_column_);
+    count += static_cast<std::size_t>(present_[there] != 0 || seen.column == 0);
   }
+  near_.count = (count + by - 1) / by * by;
+  std::fill(near_.present.begin() + static_cast<std::ptrdiff_t>(count),
+            near_.present.begin() + static_cast<std::ptrdiff_t>(near_.count), 0);
 }
 
 }  // namespace vdbdither

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -25,36 +26,43 @@ class OpenSurroundings {
   /// Adds the decided voxel at `ijk`, which lies in the block, or replaces it.
   void set(const openvdb::Coord& ijk, const OpenVoxel& voxel);
 
-  /// Returns Σ q·w over the voxels that are there, as seen from a voxel of the block. The bits are
-  /// the same with every instruction set: voxels are added up by the remainder of their place in
-  /// the column of the kernel, by four.
+  /// Returns Σ q·w over the voxels that are there, as seen from a voxel of the block. In each
+  /// column of the kernel, every fourth voxel is added to the same partial sum, so that all
+  /// instruction sets give the same bits.
   [[nodiscard]] float sum(const openvdb::Coord& ijk, float depth);
 
  private:
-  /// A column of the kernel that holds voxels, as seen from a row along z of the block.
-  struct Near {
-    const std::uint64_t* present;
-    std::uint32_t first;   ///< the index of its depths and errors
+  /// A column of the kernel, as seen from the column in its middle.
+  struct Seen {
+    int column;            ///< its index less that in the middle
     std::uint32_t apart2;  ///< the index of its first |Δ|² in the kernel
-    unsigned half;         ///< z of HeightKernel::Column
+    int half;              ///< z of HeightKernel::Column
   };
-  /// Voxels of a column that are added up together: indices of the first.
-  struct Group {
-    std::uint32_t voxels;
-    std::uint32_t apart2;
+  /// The columns around one column that hold voxels, and that one. They are read by groups of eight
+  /// voxels from the lowest within the kernel on. Eight columns are looked at at a time.
+  struct Near {
+    explicit Near(std::size_t columns);
+    std::size_t middle;                  ///< the column around which they are
+    std::size_t own;                     ///< its place among them
+    int own_half;                        ///< the half of that column
+    std::size_t count = 0;               ///< rounded up to eight
+    std::vector<std::uint64_t> present;  ///< bit z: the lowest voxel for a sum at z
+    std::vector<std::uint64_t> window;   ///< the voxels of a sum at 0
+    std::vector<std::ptrdiff_t> voxels;  ///< index of the depth and error of the lowest for 0
+    std::vector<std::uint32_t> apart2;
   };
   struct Loops;
 
   void clear();
   void read(const OpenLeaf& leaf, const openvdb::Coord& from);
-  void lookAround(int x, int y);
+  void lookAround(std::size_t column);
   [[nodiscard]] std::size_t columnOf(int x, int y) const {
     return static_cast<std::size_t>(x * edges_.y() + y);
   }
 
   const HeightKernel& kernel_;
   const BlockOrder& order_;
-  float (*sum_)(OpenSurroundings& around, unsigned z, float depth);
+  float (*sum_)(const OpenSurroundings& around, unsigned z, float depth);
   openvdb::Coord reach_;
   openvdb::Coord edges_;
   openvdb::Coord lowest_;               ///< the voxel at the corner of what is held
@@ -62,10 +70,8 @@ class OpenSurroundings {
   std::vector<std::uint64_t> present_;  ///< by column along z
   std::vector<float> depths_;
   std::vector<float> errors_;  ///< zero where no voxel is
-  std::size_t own_column_;     ///< that `near_` belongs to
-  std::vector<Near> near_;     ///< the columns around it that hold voxels, and itself
-  std::size_t near_count_ = 0;
-  std::vector<Group> groups_;  ///< those of the sum that is being made
+  std::vector<Seen> seen_;
+  Near near_;
 };
 
 }  // namespace vdbdither
