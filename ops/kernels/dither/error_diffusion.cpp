@@ -29,8 +29,10 @@ void diffuse(OpenLeaf& leaf, OpenSurroundings& around) {
   leaf.forEachOpen([&](unsigned offset, OpenVoxel& voxel) {
     const openvdb::Coord ijk = leaf.origin + FloatLeaf::offsetToLocalCoord(offset);
     const bool free = bitAt(leaf.free, offset);
-    if (free) setBit(leaf.printed, offset, voxel.tone > 0.5F + around.sum(ijk, voxel.depth));
-    voxel.setPrinted(bitAt(leaf.printed, offset), free);
+    bool printed = bitAt(leaf.printed, offset);
+    if (free) printed = voxel.tone > 0.5F + around.sum(ijk, voxel.depth);
+    setBit(leaf.printed, offset, printed);
+    voxel.setPrinted(printed, free);
     around.set(ijk, voxel);
   });
   leaf.decided = true;

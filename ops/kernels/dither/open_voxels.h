@@ -19,11 +19,11 @@ inline bool bitAt(const LeafBits& bits, unsigned offset) {
   return (bits[offset / 64] >> (offset % 64) & 1) != 0;
 }
 
-/// Sets it.
+/// Sets it. Without a branch: which voxels are printed cannot be foretold.
 inline void setBit(LeafBits& bits, unsigned offset, bool value) {
-  const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
   std::uint64_t& word = bits[offset / 64];
-  word = value ? word | bit : word & ~bit;
+  word &= ~(std::uint64_t{1} << (offset % 64));
+  word |= std::uint64_t{value} << (offset % 64);
 }
 
 /// A voxel that can be printed or not: |d| < k_D.
@@ -34,7 +34,9 @@ struct OpenVoxel {
 
   /// Sets the error. A voxel that the guard holds passes none on: at an edge of the part, its
   /// neighbours on flat faces would make up for it with bumps.
-  void setPrinted(bool printed, bool free) { error = free ? (printed ? 1.0F : 0.0F) - tone : 0.0F; }
+  void setPrinted(bool printed, bool free) {
+    error = free ? static_cast<float>(static_cast<int>(printed)) - tone : 0.0F;
+  }
 };
 
 /// The open voxels of a leaf, in the order of the leaf.
