@@ -139,24 +139,21 @@ bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsi
   const double depth_mm = std::abs(double{d_mm});
   const int own = d_mm < 0 ? -1 : 1;  // the side that the voxel lies on
   const float* here = around.at(offset);
-  // The distance of a voxel from the surface, positive on the given side.
-  const auto sample = [&](int side, const Coord& step) {
-    const int farthest = std::max({std::abs(step.x()), std::abs(step.y()), std::abs(step.z())});
-    const double d =
-        farthest <= At::halo
-            ? double{here[step.x() * At::stride_x + step.y() * At::stride_y + step.z()]}
-            : distance(origin + FloatLeaf::offsetToLocalCoord(offset) + step);
+  // The distance of the voxel n steps outward, positive on the given side.
+  const int step = outward.x() * At::stride_x + outward.y() * At::stride_y + outward.z();
+  const auto sample = [&](int side, int n) {
+    const double d = std::abs(n) <= At::halo
+                         ? double{here[n * step]}
+                         : distance(origin + FloatLeaf::offsetToLocalCoord(offset) +
+                                    Coord(n * outward.x(), n * outward.y(), n * outward.z()));
     return std::clamp(side * d, -band_mm, band_mm);
   };
 
   // T on the voxel's own side, one step further in; then across the face, by the steps that are
   // needed to tell thick from thin.
   const int steps = 1 + static_cast<int>(1.5 * depth_mm / rise_all_mm + 0.95);
-  const auto outward_by = [&](int n) {
-    return Coord(n * outward.x(), n * outward.y(), n * outward.z());
-  };
-  if (sample(own, outward_by(own)) < half_diameter_mm) return false;
-  const double beyond_mm = sample(-own, outward_by(-own * steps));
+  if (sample(own, own) < half_diameter_mm) return false;
+  const double beyond_mm = sample(-own, -own * steps);
   if (beyond_mm <= -band_mm ||
       beyond_mm < 2 * depth_mm + half_diameter_mm - (steps - 1) * rise_all_mm)
     return false;
