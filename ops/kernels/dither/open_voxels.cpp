@@ -55,8 +55,8 @@ class OpenVoxelFinder {
         {static_cast<float>(double{d} / spread_mm), tone_(d, half_diameter_mm, spread_mm), 0.0F});
     setBit(open.open, offset, true);
     setBit(open.free, offset,
-           !settings_.guarded ||
-               guard_.allows(normals_.around(), open.leaf->origin(), offset, normal, d));
+           !settings_.guarded || guard_.allows(normals_.around(), open.leaf->origin(), offset,
+                                               normal, d, half_diameter_mm));
   }
 
   VoxelNormals normals_;

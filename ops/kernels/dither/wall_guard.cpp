@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "ops/kernels/leaf/floats.h"
-#include "ops/kernels/leaf/voxel_diameter.h"
 
 namespace vdbdither {
 
@@ -118,13 +117,12 @@ WallGuard::WallGuard(const openvdb::FloatTree& surface, const openvdb::Vec3d& pi
 }
 
 bool WallGuard::allows(const LeafSurroundings& around, const Coord& origin, unsigned offset,
-                       const openvdb::Vec3s& normal, float d_mm) {
+                       const openvdb::Vec3s& normal, float d_mm, double half_diameter_mm) {
   openvdb::Vec3d rise_mm;
   for (int axis = 0; axis < 3; ++axis)
     rise_mm[axis] = std::abs(double{normal[axis]}) * pitch_mm_[axis];
   const double highest_mm = std::max({rise_mm[0], rise_mm[1], rise_mm[2]});
   if (highest_mm == 0) return false;
-  const double half_diameter_mm = halfVoxelDiameter(normal, pitch_mm_);
   const double band_mm = std::min(std::max(highest_mm, 2 * half_diameter_mm), background_mm_);
 
   Coord outward(0);

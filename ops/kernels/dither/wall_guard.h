@@ -39,9 +39,10 @@ class WallGuard {
             ZRange valid, InstructionSet instructions = bestInstructionSet());
 
   /// Whether the voxel at `offset` in the leaf at `origin`, whose surroundings are `around`, may be
-  /// changed. Its distance is `d_mm` from a face with this normal.
+  /// changed. Its distance is `d_mm` from a face with this normal, and `half_diameter_mm` is k_D.
   [[nodiscard]] bool allows(const LeafSurroundings& around, const openvdb::Coord& origin,
-                            unsigned offset, const openvdb::Vec3s& normal, float d_mm);
+                            unsigned offset, const openvdb::Vec3s& normal, float d_mm,
+                            double half_diameter_mm);
 
   /// The maximum number of layers to a sample, for displacements up to ½·amplitude·k_D.
   static int reachLayers(double amplitude) {

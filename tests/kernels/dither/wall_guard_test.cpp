@@ -8,6 +8,7 @@
 
 #include "ops/kernels/distance/gradient.h"
 #include "ops/kernels/distance/mesh_distance.h"
+#include "ops/kernels/leaf/voxel_diameter.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/shapes.h"
 
@@ -91,8 +92,9 @@ TEST(WallGuard, EveryInstructionSetAllowsTheSameVoxels) {
         forEachBit(near, [&](unsigned offset) {
           const float d = leaf->buffer().data()[offset];
           const auto allows = [&](WallGuard& guard) {
-            return guard.allows(normals.around(), leaf->origin(), offset, normals.normal(offset),
-                                d);
+            const openvdb::Vec3s normal = normals.normal(offset);
+            return guard.allows(normals.around(), leaf->origin(), offset, normal, d,
+                                halfVoxelDiameter(normal, pitch_mm));
           };
           const bool allowed = allows(best);
           ASSERT_EQ(allowed, allows(baseline)) << leaf->offsetToGlobalCoord(offset);
