@@ -43,8 +43,8 @@ class OpenSurroundings {
   struct Near {
     explicit Near(std::size_t columns);
     std::size_t middle;                  ///< the column around which they are
-    std::size_t own;                     ///< its place among them
-    int own_half;                        ///< the half of that column
+    std::size_t own = 0;                 ///< its place among them
+    int own_half = 0;                    ///< the half of that column
     std::size_t count = 0;               ///< rounded up to eight
     std::vector<std::uint64_t> present;  ///< bit z: the lowest voxel for a sum at z
     std::vector<std::uint64_t> window;   ///< the voxels of a sum at 0

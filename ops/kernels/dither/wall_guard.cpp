@@ -52,7 +52,7 @@ struct WallGuard::Flat {
 struct WallGuard::Loops {
   template <typename Lanes>
   [[gnu::always_inline]] static bool isBent(const Flat& flat, const float* here) {
-    constexpr std::size_t at_once = sizeof(Lanes) / sizeof(Floats);
+    constexpr std::size_t at_once = sizeof(Lanes) / (4 * sizeof(float));
     constexpr auto per_radius = static_cast<float>(1 / (2 * minimum_radius_mm));
     const Lanes band = Lanes{} + flat.band;
     const Floats rise_z{-flat.rise_z, 0, flat.rise_z, 0};
