@@ -8,7 +8,6 @@
 #endif
 
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 namespace vdbdither {
@@ -62,14 +61,11 @@ Vec3s LeafNormals::normal(unsigned offset) const {
   return {normals[0][0], normals[1][0], normals[2][0]};
 }
 
-LeafNormals::Row LeafNormals::row(unsigned offset) const {
-  Row row;
+void LeafNormals::makeRow(unsigned offset, Row& row) const {
   for (std::size_t z = 0; z < 8; z += 4) {
     const std::array<Floats, 3> normals = unitGradients(around_.at(offset) + z, per_pitch_);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      std::memcpy(&row[axis][z], &normals[axis], sizeof(Floats));
+    for (std::size_t axis = 0; axis < 3; ++axis) storeFloats(&row[axis][z], normals[axis]);
   }
-  return row;
 }
 
 openvdb::Vec3SGrid::Ptr makeNormalGrid(const openvdb::math::Transform& transform) {
@@ -99,7 +95,8 @@ openvdb::Vec3SGrid::Ptr outwardNormals(const openvdb::FloatGrid& surface,
       for (unsigned offset = 0; offset < 512; offset += 8) {
         const auto row = static_cast<std::uint8_t>(bits[offset / 64] >> (offset % 64));
         if (row == 0) continue;
-        const LeafNormals::Row normal = normals.row(offset);
+        LeafNormals::Row normal;
+        normals.makeRow(offset, normal);
         for (unsigned z = 0; z < 8; ++z) {
           if ((row >> z) & 1U) out[offset + z] = {normal[0][z], normal[1][z], normal[2][z]};
         }

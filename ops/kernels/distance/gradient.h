@@ -28,10 +28,11 @@ class LeafNormals {
   /// Returns the normal of the active and wanted voxel at `offset` in the leaf.
   [[nodiscard]] openvdb::Vec3s normal(unsigned offset) const;
 
-  /// By component, the normals of the eight voxels from `offset` on: a row along z that holds a
-  /// wanted voxel. Those of inactive voxels are undefined.
+  /// By component, the normals of eight voxels.
   using Row = std::array<std::array<float, 8>, 3>;
-  [[nodiscard]] Row row(unsigned offset) const;
+  /// Sets `row` to those from `offset` on: a row along z that holds a wanted voxel. Those of
+  /// inactive voxels are undefined.
+  void makeRow(unsigned offset, Row& row) const;
 
   /// The distances that the normals are computed from.
   [[nodiscard]] const LeafSurroundings& around() const { return around_; }

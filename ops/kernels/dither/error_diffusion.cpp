@@ -5,6 +5,7 @@
 
 #include "ops/kernels/dither/error_diffusion.h"
 
+#include "ops/kernels/dither/open_surroundings.h"
 #include "ops/kernels/leaf/solid.h"
 
 namespace vdbdither {
@@ -26,10 +27,12 @@ constexpr double width = 1.15;
 /// Decides the voxels of a leaf in the order of the leaf.
 void diffuse(OpenLeaf& leaf, OpenSurroundings& around) {
   leaf.forEachOpen([&](unsigned offset, OpenVoxel& voxel) {
-    const openvdb::Coord ijk = leaf.leaf->offsetToGlobalCoord(offset);
+    const openvdb::Coord ijk = leaf.origin + FloatLeaf::offsetToLocalCoord(offset);
     const bool free = bitAt(leaf.free, offset);
-    if (free) setBit(leaf.printed, offset, voxel.tone > 0.5F + around.sum(ijk, voxel.depth));
-    voxel.setPrinted(bitAt(leaf.printed, offset), free);
+    bool printed = bitAt(leaf.printed, offset);
+    if (free) printed = voxel.tone > 0.5F + around.sum(ijk, voxel.depth);
+    setBit(leaf.printed, offset, printed);
+    voxel.setPrinted(printed, free);
     around.set(ijk, voxel);
   });
   leaf.decided = true;
@@ -54,7 +57,7 @@ openvdb::BoolGrid::Ptr ErrorDiffusion::run(const openvdb::FloatGrid& surface,
   leaves.visitInOrder(order_.needed(core), [&] {
     return [find = OpenLeaves::Finder(leaves),
             around = OpenSurroundings(kernel_, order_)](OpenLeaves::Block block) mutable {
-      around.visit(*block.front(), find);
+      around.visit(block, find);
       for (OpenLeaf* leaf : block) diffuse(*leaf, around);
     };
   });

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <array>
+#include <cstdint>
 #include <vector>
 
 #include <openvdb/openvdb.h>
@@ -28,8 +28,8 @@ class HeightKernel {
   /// The voxels of one column along z within the reach, around the one in the middle.
   struct Column {
     int x, y;
-    int z;          ///< the column holds −z … z
-    float across2;  ///< (Δx/σ_x)² + (Δy/σ_y)²
+    int z;                 ///< the column holds −z … z
+    std::uint32_t apart2;  ///< the index of that of −z
   };
 
   /// \param pitch_mm  edges of the voxels
@@ -45,10 +45,9 @@ class HeightKernel {
 
   [[nodiscard]] const std::vector<Column>& columns() const { return columns_; }
 
-  /// (Δz/σ_z)² of the voxels of a column, by four; beyond the column, a value of weight zero.
-  [[nodiscard]] const std::vector<Floats>& along2(int z) const {
-    return along2_[static_cast<std::size_t>(z)];
-  }
+  /// (|Δ|/σ)² of the voxels of all columns. Those of a column are followed by values of weight
+  /// zero, for reading by eight.
+  [[nodiscard]] const std::vector<float>& apart2() const { return apart2_; }
 
   /// The weights of one hill by x = |Δ|² − (d_v − d_w)² in units of σ². Negative x, which distances
   /// from different facets can give, count as zero.
@@ -56,20 +55,25 @@ class HeightKernel {
     float slope;
     float factor;
 
-    [[nodiscard]] Floats operator()(Floats x) const {
-      Floats w = greaterOf(1.0F - greaterOf(x, Floats{}) * slope, Floats{});
+    /// Sets `w` to the weights; `Lanes` is Floats or EightFloats.
+    template <typename Lanes>
+    [[gnu::always_inline]] void weigh(const Lanes& x, Lanes& w) const {
+      w = 1.0F - (x > 0.0F ? x : Lanes{}) * slope;
+      w = w > 0.0F ? w : Lanes{};
       w *= w;
       w *= w;
       w *= w;
-      return factor * w;
+      w *= factor;
     }
   };
   [[nodiscard]] const std::vector<Hill>& hills() const { return hills_; }
 
  private:
+  void addColumn(int x, int y, int z, double across2, double step);
+
   openvdb::Coord reach_;
   std::vector<Column> columns_;
-  std::array<std::vector<Floats>, maximum_reach + 1> along2_;
+  std::vector<float> apart2_;
   std::vector<Hill> hills_;
 };
 

@@ -9,7 +9,6 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include "ops/kernels/dither/block_order.h"
-#include "ops/kernels/dither/height_kernel.h"
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
 
@@ -20,11 +19,11 @@ inline bool bitAt(const LeafBits& bits, unsigned offset) {
   return (bits[offset / 64] >> (offset % 64) & 1) != 0;
 }
 
-/// Sets it.
+/// Sets it. Without a branch: which voxels are printed cannot be foretold.
 inline void setBit(LeafBits& bits, unsigned offset, bool value) {
-  const std::uint64_t bit = std::uint64_t{1} << (offset % 64);
   std::uint64_t& word = bits[offset / 64];
-  word = value ? word | bit : word & ~bit;
+  word &= ~(std::uint64_t{1} << (offset % 64));
+  word |= std::uint64_t{value} << (offset % 64);
 }
 
 /// A voxel that can be printed or not: |d| < k_D.
@@ -35,17 +34,21 @@ struct OpenVoxel {
 
   /// Sets the error. A voxel that the guard holds passes none on: at an edge of the part, its
   /// neighbours on flat faces would make up for it with bumps.
-  void setPrinted(bool printed, bool free) { error = free ? (printed ? 1.0F : 0.0F) - tone : 0.0F; }
+  void setPrinted(bool printed, bool free) {
+    error = free ? static_cast<float>(static_cast<int>(printed)) - tone : 0.0F;
+  }
 };
 
 /// The open voxels of a leaf, in the order of the leaf.
 struct OpenLeaf {
-  const FloatLeaf* leaf;
+  const FloatLeaf* leaf = nullptr;
+  openvdb::Coord origin;
+  bool decided = false;
+  std::vector<OpenVoxel> voxels;
+  std::array<std::uint16_t, 8> first{};  ///< of the voxels at each x, as an index of `voxels`
   LeafBits open{};
   LeafBits free{};     ///< the open voxels that the guard allows to change
   LeafBits printed{};  ///< all voxels; those of the plain voxelization until they are decided
-  bool decided = false;
-  std::vector<OpenVoxel> voxels;
 
   /// Calls `visit(offset, voxel)` for every open voxel, in the order of the leaf.
   template <typename Visit>
@@ -74,22 +77,22 @@ class OpenLeaves {
   OpenLeaves(const openvdb::FloatGrid& surface, const openvdb::Vec3SGrid* normals,
              const Settings& settings, const BlockOrder& order, ZRange layers, ZRange valid);
 
-  /// The leaves of a block, in the order of the tree.
+  /// The leaves of a block that have open voxels, in the order of the tree.
   using Block = std::span<OpenLeaf* const>;
 
-  /// Finds leaves by their origins.
+  /// Finds blocks by their indices.
   class Finder {
    public:
     explicit Finder(const OpenLeaves& leaves)
-        : leaves_(leaves.leaves_), numbers_(leaves.numbers_) {}
-    /// Returns the leaf at `origin`, or null.
-    const OpenLeaf* operator()(const openvdb::Coord& origin) {
-      const openvdb::Int32 number = numbers_.getValue(origin >> leaf_shift);
-      return number < 0 ? nullptr : &leaves_[static_cast<std::size_t>(number)];
+        : blocks_(leaves.blocks_), numbers_(leaves.numbers_) {}
+    /// Returns the block with this index, empty if there is none.
+    Block operator()(const openvdb::Coord& index) {
+      const openvdb::Int32 number = numbers_.getValue(index);
+      return number < 0 ? Block() : blocks_[static_cast<std::size_t>(number)];
     }
 
    private:
-    const std::vector<OpenLeaf>& leaves_;
+    const std::vector<Block>& blocks_;
     openvdb::tree::ValueAccessor<const openvdb::Int32Tree, false> numbers_;
   };
 
@@ -114,7 +117,7 @@ class OpenLeaves {
       tbb::parallel_for(Range(0, layers.size()), [&](const Range& some_layers) {
         for (std::size_t n = some_layers.begin(); n != some_layers.end(); ++n) {
           if (!range.contains(layers[n].bottom)) continue;
-          for (const Blocks& blocks : layers[n].blocks) {
+          for (const std::span<const Block> blocks : layers[n].blocks) {
             tbb::parallel_for(Range(0, blocks.size()), [&](const Range& some_blocks) {
               auto& visit = workers.local();
               for (std::size_t m = some_blocks.begin(); m != some_blocks.end(); ++m)
@@ -127,54 +130,18 @@ class OpenLeaves {
   }
 
  private:
-  static constexpr openvdb::Index leaf_shift = FloatLeaf::LOG2DIM;
-
-  using Blocks = std::vector<Block>;
   struct Layer {
-    int bottom;                                          ///< its lowest layer of voxels
-    std::array<Blocks, BlockOrder::colours / 2> blocks;  ///< by the colours of its parity
+    int bottom;  ///< its lowest layer of voxels
+    std::array<std::span<const Block>, BlockOrder::colours / 2> blocks;  ///< by colour
   };
 
   void sortIntoBlocks(const BlockOrder& order);
 
   std::vector<OpenLeaf> leaves_;      ///< in the order of the tree
-  std::vector<OpenLeaf*> in_blocks_;  ///< the same by blocks
-  openvdb::Int32Tree numbers_{-1};  ///< indices of `leaves_`, by the indices of the leaves in space
+  std::vector<OpenLeaf*> in_blocks_;  ///< those with open voxels, by blocks
+  std::vector<Block> blocks_;         ///< in the order of visits within each layer
+  openvdb::Int32Tree numbers_{-1};  ///< indices of `blocks_`, by the indices of the blocks in space
   std::array<std::vector<Layer>, 2> layers_;  ///< by parity
-};
-
-/// The open voxels of a block and of those around it, within the reach of a kernel, for sums over
-/// their errors.
-class OpenSurroundings {
- public:
-  OpenSurroundings(const HeightKernel& kernel, const BlockOrder& order);
-
-  /// Moves to the block that holds `leaf` and reads the decided voxels in and around it.
-  void visit(const OpenLeaf& leaf, OpenLeaves::Finder& leaves);
-
-  /// Adds the decided voxel at `ijk`, which lies in the block, or replaces it.
-  void set(const openvdb::Coord& ijk, const OpenVoxel& voxel);
-
-  /// Returns Σ q·w over the voxels that are there, as seen from a voxel of the block.
-  [[nodiscard]] float sum(const openvdb::Coord& ijk, float depth) const;
-
- private:
-  void read(const OpenLeaf& leaf, const openvdb::Coord& from);
-  template <typename Weigh>
-  [[nodiscard]] float sumOf(const openvdb::Coord& at, float depth, Weigh weigh) const;
-  [[nodiscard]] std::size_t columnOf(int x, int y) const {
-    return static_cast<std::size_t>(x * edges_.y() + y);
-  }
-
-  const HeightKernel& kernel_;
-  const BlockOrder& order_;
-  openvdb::Coord reach_;
-  openvdb::Coord edges_;
-  openvdb::Coord lowest_;               ///< the voxel at the corner of what is held
-  std::size_t stride_;                  ///< from column to column
-  std::vector<std::uint64_t> present_;  ///< by column along z
-  std::vector<float> depths_;
-  std::vector<float> errors_;  ///< zero where no voxel is
 };
 
 }  // namespace vdbdither

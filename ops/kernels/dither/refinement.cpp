@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "ops/kernels/dither/open_surroundings.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/true_bits.h"
 
@@ -66,11 +67,11 @@ class RefinedBlock {
     voxels_.clear();
     places_.clear();
     std::fill(numbers_.begin(), numbers_.end(), none);
-    around_.visit(*leaves.front(), find);
-    const Coord corner = order_.cornerOf(leaves.front()->leaf->origin());
+    around_.visit(leaves, find);
+    const Coord corner = order_.cornerOf(leaves.front()->origin);
     for (OpenLeaf* leaf : leaves) {
       leaf->forEachOpen([&](unsigned offset, const OpenVoxel& open) {
-        const Coord ijk = leaf->leaf->offsetToGlobalCoord(offset);
+        const Coord ijk = leaf->origin + FloatLeaf::offsetToLocalCoord(offset);
         const Coord at = ijk - corner;
         numbers_[indexOf(at)] = static_cast<std::int16_t>(voxels_.size());
         voxels_.push_back(
@@ -136,7 +137,11 @@ class RefinedBlock {
     const Floats deeper = places_.depth[n] - loadFloats(&places_.depth[m]);
     const Floats lateral2 = x * x + y * y + z * z - deeper * deeper;
     Floats sum{};
-    for (const HeightKernel::Hill& hill : kernel_.hills()) sum += hill(lateral2);
+    for (const HeightKernel::Hill& hill : kernel_.hills()) {
+      Floats w;
+      hill.weigh(lateral2, w);
+      sum += w;
+    }
     return sum;
   }
 
@@ -172,7 +177,7 @@ class RefinedBlock {
 
 /// Takes over which voxels of `solid` are printed.
 void begin(OpenLeaf& leaf, openvdb::tree::ValueAccessor<const openvdb::BoolTree, false>& solid) {
-  const Coord origin = leaf.leaf->origin();
+  const Coord origin = leaf.origin;
   if (const auto* there = solid.probeConstLeaf(origin)) {
     leaf.printed = trueBits(*there);
   } else {

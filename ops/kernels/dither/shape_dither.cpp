@@ -211,8 +211,9 @@ ShapeDither::Result ShapeDither::run(const openvdb::FloatGrid& surface,
         if (guarded) {
           forEachBit(overturned, [&](unsigned offset) {
             const float plain = distances[offset];
-            if (guard.allows(voxel_normals.around(), leaf.origin(), offset, voxel_normals(offset),
-                             plain))
+            const Vec3s normal = voxel_normals(offset);
+            if (guard.allows(voxel_normals.around(), leaf.origin(), offset, normal, plain,
+                             halfVoxelDiameter(normal, pitch_mm)))
               return;
             overturned[offset / 64] &= ~(std::uint64_t{1} << (offset % 64));
             if (moved) moved->setValueOnly(offset, plain);

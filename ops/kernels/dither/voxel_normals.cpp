@@ -31,11 +31,11 @@ LeafBits VoxelNormals::within(const LeafBits& undecided, double reach) {
   for (unsigned row = 0; row < 64; ++row) {
     const auto bits = static_cast<std::uint8_t>(undecided[row / 8] >> (row % 8 * 8));
     if (bits == 0) continue;
-    makeRow(row);
+    const LeafNormals::Row& normals = rowOf(row);
     const float* d = leaf_->buffer().data() + std::size_t{8} * row;
     std::array<float, 8> steepest{};  // 1 / (2·k_D)
     for (unsigned axis = 0; axis < 3; ++axis) {
-      const float* normal = &normals_[axis][std::size_t{8} * row];
+      const std::array<float, 8>& normal = normals[axis];
       for (unsigned z = 0; z < 8; ++z) {
         const float steep = std::abs(normal[z]) * per_pitch_[axis];
         steepest[z] = steep > steepest[z] ? steep : steepest[z];
@@ -50,14 +50,14 @@ LeafBits VoxelNormals::within(const LeafBits& undecided, double reach) {
   return near;
 }
 
-void VoxelNormals::makeRow(unsigned row) {
+const LeafNormals::Row& VoxelNormals::rowOf(unsigned row) {
   const std::uint64_t bit = std::uint64_t{1} << row;
-  if ((rows_made_ & bit) != 0) return;
-  rows_made_ |= bit;
-  around();
-  const LeafNormals::Row made = gradient_.row(8 * row);
-  for (unsigned axis = 0; axis < 3; ++axis)
-    std::copy_n(made[axis].data(), 8, &normals_[axis][std::size_t{8} * row]);
+  if ((rows_made_ & bit) == 0) {
+    rows_made_ |= bit;
+    around();
+    gradient_.makeRow(8 * row, rows_[row]);
+  }
+  return rows_[row];
 }
 
 }  // namespace vdbdither

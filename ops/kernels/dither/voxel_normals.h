@@ -34,8 +34,8 @@ class VoxelNormals {
   /// Returns the normal of the active voxel at `offset`.
   openvdb::Vec3s operator()(unsigned offset) {
     if (given_) return given_->getValue(leaf_->offsetToGlobalCoord(offset));
-    makeRow(offset / 8);
-    return {normals_[0][offset], normals_[1][offset], normals_[2][offset]};
+    const LeafNormals::Row& row = rowOf(offset / 8);
+    return {row[0][offset % 8], row[1][offset % 8], row[2][offset % 8]};
   }
 
   /// Returns those of `undecided` that are within `reach`·k_D of the surface along their normal,
@@ -43,7 +43,7 @@ class VoxelNormals {
   LeafBits within(const LeafBits& undecided, double reach);
 
  private:
-  void makeRow(unsigned row);
+  const LeafNormals::Row& rowOf(unsigned row);
 
   LeafNormals gradient_;
   std::optional<NormalAccessor> given_;
@@ -52,7 +52,7 @@ class VoxelNormals {
   LeafBits wanted_{};
   bool visited_ = false;
   std::uint64_t rows_made_ = 0;  ///< one bit per row along z, in the order of the leaf
-  std::array<std::array<float, 512>, 3> normals_{};
+  std::array<LeafNormals::Row, 64> rows_{};
 };
 
 }  // namespace vdbdither

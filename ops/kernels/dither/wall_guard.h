@@ -1,8 +1,11 @@
 #pragma once
 
+#include <array>
+
 #include <openvdb/openvdb.h>
 
 #include "ops/kernels/leaf/leaf_surroundings.h"
+#include "vdbdither/model/instruction_set.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
@@ -33,13 +36,13 @@ class WallGuard {
  public:
   /// `surface` holds d in mm; layers outside `valid` are outside the part.
   WallGuard(const openvdb::FloatTree& surface, const openvdb::Vec3d& pitch_mm, float background_mm,
-            ZRange valid)
-      : surface_(surface), pitch_mm_(pitch_mm), background_mm_(background_mm), valid_(valid) {}
+            ZRange valid, InstructionSet instructions = bestInstructionSet());
 
   /// Whether the voxel at `offset` in the leaf at `origin`, whose surroundings are `around`, may be
-  /// changed. Its distance is `d_mm` from a face with this normal.
+  /// changed. Its distance is `d_mm` from a face with this normal, and `half_diameter_mm` is k_D.
   [[nodiscard]] bool allows(const LeafSurroundings& around, const openvdb::Coord& origin,
-                            unsigned offset, const openvdb::Vec3s& normal, float d_mm);
+                            unsigned offset, const openvdb::Vec3s& normal, float d_mm,
+                            double half_diameter_mm);
 
   /// The maximum number of layers to a sample, for displacements up to ½·amplitude·k_D.
   static int reachLayers(double amplitude) {
@@ -47,6 +50,13 @@ class WallGuard {
   }
 
  private:
+  struct Flat;
+  struct Loops;
+
+  /// The neighbours of a voxel by rows of three along z; the fourth of each row is idle. There is
+  /// one row more, the same as the last, so that two rows can be read at a time.
+  static constexpr std::size_t rows = 10;
+
   /// Returns d of a voxel, infinite if it is unknown.
   double distance(const openvdb::Coord& ijk);
 
@@ -54,6 +64,8 @@ class WallGuard {
   openvdb::Vec3d pitch_mm_;
   double background_mm_;
   ZRange valid_;
+  std::array<float, 4 * rows> apart2_{};  ///< |Δ|² of the neighbours, in mm²
+  bool (*is_bent_)(const Flat& flat, const float* here);
 };
 
 }  // namespace vdbdither

@@ -11,6 +11,9 @@ namespace vdbdither {
 
 /// Four floats that are computed together; every lane has the bits that a float would have.
 using Floats = float __attribute__((vector_size(16)));
+/// Eight floats, for code that is compiled for AVX2. Such values are passed by reference only: how
+/// they are passed by value depends on the instruction set.
+using EightFloats = float __attribute__((vector_size(32)));
 /// The result of a comparison: all ones where it holds, else zero.
 using FloatBits = std::int32_t __attribute__((vector_size(16)));
 

@@ -103,14 +103,17 @@ inline std::size_t countOf(const LeafBits& bits) {
   return count;
 }
 
+/// Calls `visit(number)` for every set bit, in rising order.
+template <typename Visit>
+void forEachBit(std::uint64_t word, Visit visit) {
+  for (; word != 0; word &= word - 1) visit(static_cast<unsigned>(std::countr_zero(word)));
+}
+
 /// Calls `visit(offset)` for every set bit, in rising order of the offset in the leaf.
 template <typename Visit>
 void forEachBit(const LeafBits& bits, Visit visit) {
-  for (unsigned x = 0; x < bits.size(); ++x) {
-    for (std::uint64_t word = bits[x]; word != 0; word &= word - 1) {
-      visit(64 * x + static_cast<unsigned>(std::countr_zero(word)));
-    }
-  }
+  for (unsigned x = 0; x < bits.size(); ++x)
+    forEachBit(bits[x], [&](unsigned number) { visit(64 * x + number); });
 }
 
 /// Returns the leaves of `tree` that meet `layers`, in the order of the tree.

@@ -1,12 +1,14 @@
 #include "ops/kernels/dither/wall_guard.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "ops/kernels/distance/gradient.h"
 #include "ops/kernels/distance/mesh_distance.h"
+#include "ops/kernels/leaf/voxel_diameter.h"
 #include "tests/support/dither_reference.h"
 #include "tests/support/shapes.h"
 
@@ -67,6 +69,42 @@ bool referenceGuard(const FloatGrid& surface, const Coord& v, const Vec3d& norma
 /// One step of thresholds, guarded.
 ShapeDither guardedDither(const Vec3d& pitch_mm, bool guarded = true) {
   return {pitch_mm, 2, DitherAt::voxel, test::permutationMask(16), guarded};
+}
+
+TEST(WallGuard, EveryInstructionSetAllowsTheSameVoxels) {
+  if (bestInstructionSet() == InstructionSet::baseline)
+    GTEST_SKIP() << "this processor has the baseline only";
+  std::array<int, 2> voxels{};
+  for (const Vec3d& pitch_mm : test::testPitches()) {
+    for (const test::TestShape& shape : test::testShapes()) {
+      SCOPED_TRACE(shape.name);
+      const Lattice lattice = test::latticeAround(pitch_mm, shape.extent_mm, 0.15);
+      const auto surface = test::sampled(shape.distance, lattice, 1.5 * pitch_mm.length());
+      const ZRange valid = lattice.layers();
+      LeafNormals normals(surface->tree(), pitch_mm, valid);
+      WallGuard best(surface->tree(), pitch_mm, surface->background(), valid);
+      WallGuard baseline(surface->tree(), pitch_mm, surface->background(), valid,
+                         InstructionSet::baseline);
+      for (const FloatLeaf* leaf : leavesIn(surface->tree(), valid)) {
+        const LeafBits near = bandBits(*leaf, static_cast<float>(pitch_mm.length() / 2),
+                                       rowWithin(leaf->origin().z(), valid));
+        normals.visit(*leaf, near);
+        forEachBit(near, [&](unsigned offset) {
+          const float d = leaf->buffer().data()[offset];
+          const auto allows = [&](WallGuard& guard) {
+            const openvdb::Vec3s normal = normals.normal(offset);
+            return guard.allows(normals.around(), leaf->origin(), offset, normal, d,
+                                halfVoxelDiameter(normal, pitch_mm));
+          };
+          const bool allowed = allows(best);
+          ASSERT_EQ(allowed, allows(baseline)) << leaf->offsetToGlobalCoord(offset);
+          ++voxels[allowed];
+        });
+      }
+    }
+  }
+  EXPECT_GT(voxels[false], 1000);
+  EXPECT_GT(voxels[true], 1000);
 }
 
 TEST(WallGuard, GuardedDitherEqualsItsDefinitionInDoublePrecision) {
