@@ -28,7 +28,8 @@ namespace {
 /// Cells along the longest side of the triangles' bounding box.
 constexpr int most_along_longest = 64;
 constexpr int least_along_longest = 16;
-/// How many triangles may be looked at, at 20 to 40 ns each: to find cells, and then to divide them.
+/// How many triangles may be looked at, at 20 to 40 ns each: to find cells, and then to divide
+/// them.
 constexpr std::size_t least_work = 40'000'000;
 constexpr std::size_t work_per_triangle = 1500;
 constexpr double most_touches = 1e7;

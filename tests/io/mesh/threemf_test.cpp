@@ -63,44 +63,6 @@ std::string colourRefusal(const std::string& bytes) {
   return "read";
 }
 
-/// A project of PrusaSlicer: an object of two corners of a cube, of which the second is a volume of
-/// the type.
-std::string prusaProject(const std::string& metadata) {
-  std::string mesh = threemfCorner();
-  const std::string end = "</triangles></mesh>";
-  EXPECT_THAT(mesh, HasSubstr(end));
-  mesh.replace(
-      mesh.find(end), end.size(),
-      "<triangle v1=\"0\" v2=\"1\" v3=\"2\"/><triangle v1=\" 0 \" v2=\"3\" v3=\"1\"/>" + end);
-  return threemfOf(threemfModel(object(1, mesh), item(1)),
-                   {{"Metadata/Slic3r_PE_model.config",
-                     "<config><object id=\"1\" instances_count=\"1\">"
-                     "<metadata type=\"object\" key=\"name\" value=\"part\"/>"
-                     "<volume firstid=\"0\" lastid=\"3\">"
-                     "<metadata type=\"volume\" key=\"volume_type\" value=\"ModelPart\"/></volume>"
-                     "<volume firstid=\"4\" lastid=\"5\">"
-                     "<metadata type=\"volume\" key=\"name\" value=\"second\"/>" +
-                         metadata + "</volume></object></config>"}});
-}
-
-std::string volumeType(const std::string& type) {
-  return "<metadata type=\"volume\" key=\"volume_type\" value=\"" + type + "\"/>";
-}
-
-/// A project of Bambu Studio: an object of two components, of which the second is a part of the
-/// subtype.
-std::string bambuProject(const std::string& subtype) {
-  return threemfOf(
-      threemfModel(object(1, threemfCorner()) + object(2, threemfCorner()) +
-                       object(3, components(component(1) + component(2))),
-                   item(3)),
-      {{"Metadata/model_settings.config",
-        "<config><object id=\"3\"><metadata key=\"name\" value=\"part\"/>"
-        "<part id=\"1\" subtype=\"normal_part\"><metadata key=\"name\" value=\"first\"/></part>"
-        "<part id=\"2\" subtype=\"" +
-            subtype + "\"><metadata key=\"name\" value=\"second\"/></part></object></config>"}});
-}
-
 std::vector<std::string> partNames(const Mesh& mesh) {
   std::vector<std::string> names;
   for (const MeshPart& part : mesh.parts) names.push_back(part.name);
@@ -108,32 +70,6 @@ std::vector<std::string> partNames(const Mesh& mesh) {
 }
 
 float linear(int byte) { return linearOfSrgbBytes().at(static_cast<std::size_t>(byte)); }
-
-TEST(Threemf, LeavesOutVolumesThatSlicersDoNotPrint) {
-  const std::string warning =
-      "'part': leaves out 1 volume that is not printed: modifiers, support blockers and enforcers "
-      "of the slicer's project";
-  for (const std::string& bytes :
-       {prusaProject(volumeType("ParameterModifier")), prusaProject(volumeType("SupportBlocker")),
-        prusaProject(volumeType("SupportEnforcer")),
-        prusaProject("<metadata type=\"volume\" key=\"modifier\" value=\"1\"/>"),
-        bambuProject("modifier_part"), bambuProject("support_blocker"),
-        bambuProject("support_enforcer")}) {
-    Warnings warnings;
-    EXPECT_EQ(parse(bytes, &warnings).triangles.size(), 4U);
-    EXPECT_THAT(warnings, ElementsAre(warning));
-  }
-  EXPECT_EQ(parseQuietly(prusaProject(volumeType("ModelPart"))).triangles.size(), 6U);
-  EXPECT_EQ(parseQuietly(bambuProject("normal_part")).triangles.size(), 8U);
-}
-
-TEST(Threemf, RefusesVolumesThatAreCutOutOfThePart) {
-  const std::string message =
-      "'part': has a negative volume, 'second', which is to be cut out of the part; do that in the "
-      "slicer (a Boolean of meshes), or export the part as STL";
-  EXPECT_EQ(refusal(prusaProject(volumeType("NegativeVolume"))), message);
-  EXPECT_EQ(refusal(bambuProject("negative_part")), message);
-}
 
 TEST(Threemf, ReadsAMesh) {
   const Mesh mesh = parseQuietly(oneObject(threemfCorner()));
