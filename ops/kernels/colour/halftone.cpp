@@ -45,7 +45,7 @@ class Intervals {
   }
 
   /// Returns the material whose part holds a threshold, counted from 1. It counts rather than
-  /// searches, because nobody can foresee where a search ends.
+  /// searches: branches of a search are mispredicted.
   [[nodiscard]] std::int32_t at(float threshold) const {
     std::size_t before = 0;
     for (const float end : ends_) before += end <= threshold ? 1 : 0;

@@ -230,7 +230,7 @@ void OpenSurroundings::lookAround(std::size_t column) {
     near_.window[count] = (std::uint64_t{2} << (2 * seen.half)) - 1;
     near_.voxels[count] = static_cast<std::ptrdiff_t>(there * stride_) - seen.half;
     near_.apart2[count] = seen.apart2;
-    // Without a branch, which would often be foretold wrongly.
+    // Without a branch, which would often be mispredicted.
     count += static_cast<std::size_t>(present_[there] != 0 || seen.column == 0);
   }
   near_.count = (count + by - 1) / by * by;

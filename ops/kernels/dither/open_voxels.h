@@ -19,7 +19,7 @@ inline bool bitAt(const LeafBits& bits, unsigned offset) {
   return (bits[offset / 64] >> (offset % 64) & 1) != 0;
 }
 
-/// Sets it. Without a branch: which voxels are printed cannot be foretold.
+/// Sets it without a branch, which would be mispredicted.
 inline void setBit(LeafBits& bits, unsigned offset, bool value) {
   std::uint64_t& word = bits[offset / 64];
   word &= ~(std::uint64_t{1} << (offset % 64));
