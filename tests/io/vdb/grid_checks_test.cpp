@@ -16,7 +16,6 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
-using testing::HasSubstr;
 using testing::Optional;
 using testing::StartsWith;
 using testing::ThrowsMessage;

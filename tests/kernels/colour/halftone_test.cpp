@@ -20,7 +20,6 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::Int32Tree;
-using testing::HasSubstr;
 using testing::ThrowsMessage;
 
 InkSet inks() {
@@ -42,7 +41,7 @@ ThresholdMask smallMask(const Coord& size) {
 }
 
 FloatGrid::Ptr constant(const CoordBBox& box, float value) {
-  const auto grid = FloatGrid::create(0);
+  auto grid = FloatGrid::create(0);
   grid->tree().fill(box, value, true);
   return grid;
 }

@@ -38,7 +38,7 @@ bool referenceGuard(const FloatGrid& surface, const Coord& v, const Vec3d& norma
     step[axis] = normal[axis] > 0 ? 1 : -1;
   }
   const double band = std::max(greatest, 2 * test::halfDiameter(normal, pitch_mm));
-  const double k_D = test::halfDiameter(normal, pitch_mm);
+  const double half_diameter_mm = test::halfDiameter(normal, pitch_mm);
   const int own = d < 0 ? -1 : 1;
   /// On the voxel's own side positive, within the band of one diameter.
   const auto depth = [&](const Coord& at) {
@@ -50,10 +50,11 @@ bool referenceGuard(const FloatGrid& surface, const Coord& v, const Vec3d& norma
     return Coord(v.x() + n * step.x(), v.y() + n * step.y(), v.z() + n * step.z());
   };
   // T of this side, then of the other.
-  if (std::abs(d) + tau + depth(stepped(own)) < std::abs(d) + k_D + tau) return false;
+  if (std::abs(d) + tau + depth(stepped(own)) < std::abs(d) + half_diameter_mm + tau) return false;
   const int m = 1 + static_cast<int>(1.5 * std::abs(d) / tau + 0.95);
   const double beyond = -depth(stepped(-own * m));
-  if (beyond <= -band || -std::abs(d) + m * tau + beyond < std::abs(d) + k_D + tau) return false;
+  if (beyond <= -band || -std::abs(d) + m * tau + beyond < std::abs(d) + half_diameter_mm + tau)
+    return false;
   for (int n = 0; n < 27; ++n) {
     const Coord to(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
     const Vec3d by = to.asVec3d() * pitch_mm;
@@ -61,7 +62,8 @@ bool referenceGuard(const FloatGrid& surface, const Coord& v, const Vec3d& norma
     const double flat = std::clamp(std::abs(d) + own * rise, -band, band);
     const double bend = (by.lengthSqr() - rise * rise) / 0.6;
     const double there = depth(v + to);
-    if (std::min(flat, there) < k_D && std::abs(flat - there) > bend + 0.02 * tau) return false;
+    if (std::min(flat, there) < half_diameter_mm && std::abs(flat - there) > bend + 0.02 * tau)
+      return false;
   }
   return true;
 }
@@ -126,8 +128,8 @@ TEST(WallGuard, GuardedDitherEqualsItsDefinitionInDoublePrecision) {
       for (auto voxel = surface->cbeginValueOn(); voxel; ++voxel) {
         const Coord v = voxel.getCoord();
         const Vec3d normal(normals->tree().getValue(v));
-        const double k_D = test::halfDiameter(normal, pitch_mm);
-        const double f = 2 * k_D * (double{dither.mask(v)} - 0.5);
+        const double half_diameter_mm = test::halfDiameter(normal, pitch_mm);
+        const double f = 2 * half_diameter_mm * (double{dither.mask(v)} - 0.5);
         const double d = *voxel;
         if (std::abs(d + f) < 1e-7) continue;
         bool printed = d + f < 0;
