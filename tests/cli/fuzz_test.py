@@ -18,6 +18,10 @@ SECONDS = int(os.environ.get("VDBDITHER_FUZZ_SECONDS", "10"))
 # Keeps the units of each fuzzer, what it says, and what it finds.
 KEPT = os.environ.get("VDBDITHER_FUZZ_FOLDER", "")
 
+# What slicers say of the volumes of a project, in both of their ways.
+SETTINGS = """<config><object id="2"><volume firstid="0" lastid="1"><metadata type="volume" key="volume_type" value="ParameterModifier"/>
+<metadata key="modifier" value="1"/></volume></object><object id="3"><part id="2" subtype="support_blocker"><metadata key="name" value="a"/></part></object></config>"""
+
 MODEL = """<?xml version="1.0" encoding="UTF-8"?>
 <model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 <resources><basematerials id="1"><base name="red" displaycolor="#FF0000"/></basematerials>
@@ -81,6 +85,7 @@ class Fuzzers(ProgramTest):
 
     def test_the_reader_of_3mf(self):
         (self.seeds / "part.model").write_text(MODEL)
+        (self.seeds / "project.model").write_text(f"{MODEL}\n@@\n{SETTINGS}")
         self.write_model()
         self.fuzz("threemf_fuzz")
 
