@@ -19,7 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder that is there, and stays if something is in it.
+/// A folder that is there, and stays if something is in it: pieces, or what a run that was stopped
+/// is still removing behind itself.
 class PiecesFolder {
  public:
   explicit PiecesFolder(fs::path path) : path_(std::move(path)) {

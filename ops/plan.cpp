@@ -82,6 +82,8 @@ class Plan : public Tool {
     Job any;
     any.pieces.emplace_back();
     for (const auto& [name, text] : jobScripts(any)) names.insert(name);
+    std::error_code none;
+    if (fs::is_empty(folder / pieces_name, none)) names.insert(pieces_name);
     return names;
   }
 

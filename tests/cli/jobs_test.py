@@ -157,6 +157,15 @@ class Jobs(ProgramTest):
         self.succeed("piece", "job", "1")
         self.assertEqual([path.name for path in (self.folder / "job/pieces").iterdir()], ["0001"])
 
+    def test_a_job_without_pieces_can_be_planned_again(self):
+        chain = f"{DITHER} ! slice-export out"
+        self.plan(chain)
+        (self.folder / "job/pieces").mkdir()
+        self.plan(chain, "--pieces", "2", "--overwrite")
+        self.assertFalse((self.folder / "job/pieces").exists())
+        self.succeed("piece", "job", "0")
+        self.refuse(2, "'job' holds 'pieces', which was not written with the rest", "plan", chain, "--overwrite")
+
     def test_two_runs_may_make_the_same_piece_at_once(self):
         self.plan(f"{DITHER} ! slice-export out")
         runs = [self.start("piece", "job", "0-3") for _ in range(3)]

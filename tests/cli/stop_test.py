@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import pathlib
 import signal
 import subprocess
 import time
@@ -113,6 +114,10 @@ class Stopped(ProgramTest):
                 self.succeed("piece", name, "0")
         elif kind == "picture":
             self.succeed("render", "part8.stl", name, "--samples", 1, "--pixel", f"{0.16 / radius}mm")
+
+    def listing(self):
+        """As of other tests, without folders of pieces: an empty one stays where the disk is slow to remove what a piece wrote."""
+        return [(path, size) for path, size in super().listing() if pathlib.PurePath(path).name != "pieces"]
 
     def remove_outputs(self):
         subprocess.run(["rm", "-rf", *self.folder.glob("out*")], check=True)
