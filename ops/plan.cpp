@@ -83,7 +83,7 @@ class Plan : public Tool {
     any.pieces.emplace_back();
     for (const auto& [name, text] : jobScripts(any)) names.insert(name);
     std::error_code none;
-    if (fs::is_empty(folder / pieces_name, none)) names.insert(pieces_name);
+    if (fs::is_empty(folder / pieces_name, none)) names.insert(std::string(pieces_name) + "/");
     return names;
   }
 

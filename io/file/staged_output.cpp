@@ -206,15 +206,15 @@ bool isFolder(const fs::directory_entry& entry) {
   return entry.symlink_status(none).type() == fs::file_type::directory;
 }
 
-/// The first path below `folder` that `own` does not name, or nothing. A folder is named by itself
-/// or by what is in it.
+/// The first path below `folder` that `own` does not name, or nothing. A folder is named by what
+/// is in it, an empty one by its name and '/'.
 fs::path foreignIn(const fs::path& folder, const std::set<std::string>& own) {
   std::vector<fs::path> foreign;
   for (const fs::directory_entry& entry : entriesBelow(folder)) {
     fs::path path = entry.path().lexically_relative(folder);
     const std::string name = path.string();
     bool is_own = own.contains(name);
-    if (!is_own && isFolder(entry)) {
+    if (isFolder(entry)) {
       const auto below = own.lower_bound(name + "/");
       is_own = below != own.end() && below->starts_with(name + "/");
     }
