@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -242,18 +243,24 @@ fs::path pieceFolder(const fs::path& job_folder, std::size_t number) {
 }
 
 std::vector<JobInput> inputsRead(const std::vector<std::string>& outputs) {
-  const auto masks = maskCacheFolder();
-  const auto isAtOrBelow = [](const fs::path& path, const fs::path& file) {
-    const fs::path whole = fs::weakly_canonical(fs::absolute(path));
-    const fs::path part = fs::weakly_canonical(fs::absolute(file));
-    return whole == part || below(whole, part).has_value();
+  // Behind links.
+  const auto placeOf = [](const fs::path& path) {
+    return fs::weakly_canonical(fs::absolute(path));
   };
+  const auto isAtOrBelow = [](const fs::path& place, const fs::path& file) {
+    return place == file || below(place, file).has_value();
+  };
+  std::optional<fs::path> masks = maskCacheFolder();
+  if (masks) masks = placeOf(*masks);
+  std::vector<fs::path> output_places;
+  std::transform(outputs.begin(), outputs.end(), std::back_inserter(output_places), placeOf);
   std::vector<JobInput> inputs;
   for (const fs::path& file : filesRead()) {
-    if (masks && isAtOrBelow(*masks, file)) continue;
-    for (const std::string& output : outputs) {
-      if (!isAtOrBelow(output, file)) continue;
-      throw UsageError("the chain reads '" + file.string() + "' and writes '" + output +
+    const fs::path place = placeOf(file);
+    if (masks && isAtOrBelow(*masks, place)) continue;
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      if (!isAtOrBelow(output_places[i], place)) continue;
+      throw UsageError("the chain reads '" + file.string() + "' and writes '" + outputs[i] +
                        "', so that pieces would read what the merge has written; give the output "
                        "another name");
     }

@@ -218,7 +218,7 @@ void GltfPrimitives::readVertices(const GltfValue& json, const Source& source,
   if (file_.wantsColours()) readLook(json, source, primitive);
 }
 
-/// The four strongest joints: other sets of them are passed over.
+/// Reads the first set of joints; others are passed over.
 void GltfPrimitives::readBones(const GltfValue& json, const Source& source,
                                GltfPrimitive& primitive) {
   constexpr std::size_t per_vertex = 4;

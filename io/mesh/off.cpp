@@ -44,17 +44,9 @@ std::string_view offKeyword(std::string_view text) {
 
 /// The text behind the comments and blanks that it starts with.
 std::string_view withoutComments(std::string_view text) {
-  std::size_t at = 0;
-  while (at < text.size()) {
-    if (std::isspace(static_cast<unsigned char>(text[at])) != 0) {
-      ++at;
-    } else if (text[at] == '#') {
-      at = std::min(text.size(), text.find('\n', at));
-    } else {
-      break;
-    }
-  }
-  return text.substr(at);
+  TextCursor cursor(text, TextCursor::Comments::hash);
+  cursor.skipSpace();
+  return text.substr(static_cast<std::size_t>(cursor.position() - text.data()));
 }
 
 MeshMatch matchOff(const MeshFile& file) {

@@ -93,7 +93,6 @@ class VolumesReader : public XmlReader {
 /// Takes the triangles of the volume out of the object.
 void eraseTriangles(ThreemfObject& object, const std::vector<bool>& drop) {
   std::size_t kept = 0;
-  object.properties.resize(std::min(object.properties.size(), object.triangles.size()));
   const std::size_t with_properties = object.properties.size();
   std::size_t kept_properties = 0;
   for (std::size_t t = 0; t < object.triangles.size(); ++t) {

@@ -144,7 +144,7 @@ ImageStack::ImageStack(fs::path path, const std::function<void(const std::string
       names_(findImages(warn, faults)) {
   if (names_.size() > std::size_t{1} << 24)
     throw DataError("'" + path_.string() + "' has more slices than can be counted");
-  files_.noteRead(names_);
+  for (const std::string& name : names_) files_.noteRead(name);
   const ColourImage first = readFirst(static_cast<bool>(faults));
   width_ = first.pixels.width;
   height_ = first.pixels.height;

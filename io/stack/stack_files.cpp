@@ -151,9 +151,8 @@ std::vector<std::string> StackInput::names() const {
   return names;
 }
 
-void StackInput::noteRead(std::span<const std::string> names) const {
-  if (zip_) return;
-  for (const std::string& name : names) noteFileRead(place_ / name);
+void StackInput::noteRead(const std::string& name) const {
+  if (!zip_) noteFileRead(place_ / name);
 }
 
 /// Names do not climb out of the stack, so only links lead out.

@@ -76,8 +76,8 @@ class StackInput {
   [[nodiscard]] bool contains(const std::string& name) const;
   /// The names of all files.
   [[nodiscard]] std::vector<std::string> names() const;
-  /// Notes files, which are read only later, as inputs; see noteFileRead.
-  void noteRead(std::span<const std::string> names) const;
+  /// Notes a file, which is read only later, as an input; see noteFileRead.
+  void noteRead(const std::string& name) const;
 
   /// Checks that a file that is there can be read: it is an ordinary file of the stack with at most
   /// `most_bytes`. Throws DataError.

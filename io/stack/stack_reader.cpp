@@ -1,7 +1,6 @@
 #include "io/stack/stack_reader.h"
 
 #include <algorithm>
-#include <array>
 #include <set>
 #include <span>
 #include <utility>
@@ -55,7 +54,7 @@ StackReader::StackReader(const std::filesystem::path& path, EditedStack edited,
   if (!input_.described()) checkForOthers();
   // Of other stacks the manifest has the digests.
   if (edited_ == EditedStack::taken) {
-    for (const Manifest::Slice& slice : manifest_.slices) input_.noteRead(std::array{slice.file});
+    for (const Manifest::Slice& slice : manifest_.slices) input_.noteRead(slice.file);
   }
   meanings_ = meaningsOfPixels(manifest_, [&](std::uint32_t material, std::uint32_t other) {
     throw DataError(

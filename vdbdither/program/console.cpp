@@ -113,18 +113,20 @@ void Console::tell(const State& state) {
 }
 
 Console::~Console() {
-  if (teller_.joinable()) {
-    teller_.request_stop();
-    teller_.join();
-  }
+  stopTelling();
   clear();
+}
+
+bool Console::stopTelling() {
+  if (!teller_.joinable()) return false;
+  teller_.request_stop();
+  teller_.join();
+  return true;
 }
 
 void Console::end() {
   clear();
-  if (!teller_.joinable()) return;
-  teller_.request_stop();
-  teller_.join();
+  if (!stopTelling()) return;
   state_.share = 1;
   state_.done = state_.total;
   tell(state_);

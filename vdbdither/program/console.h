@@ -50,6 +50,8 @@ class Console : public Watcher {
   };
 
   void tellEachSecond(const std::stop_token& stop);
+  /// Returns whether lines for programs were told until now.
+  bool stopTelling();
   void tell(const State& state);
 
   Progress style_;

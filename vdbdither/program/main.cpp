@@ -201,9 +201,12 @@ bool tellsOpenJobDescription(int argc, char** argv) {
 }
 
 int guardedMain(int argc, char** argv) {
-  const auto fail = [&](const std::string& message, int code) {
-    claimEnding(code);
+  const auto tell = [&](const std::string& message) {
     if (tellsOpenJobDescription(argc, argv)) Console::tellFailure(message);
+  };
+  const auto fail = [&](const std::string& message, int code) {
+    tell(message);
+    claimEnding(code);
     std::fprintf(stderr, "vdbdither%s %s\n", namesItsVerb(message) ? "" : ":",
                  printable(message).c_str());
     return code;
@@ -222,6 +225,7 @@ int guardedMain(int argc, char** argv) {
     claimEnding(0);
     return 0;
   } catch (const Interrupted& error) {
+    tell(error.what());
     claimEnding(128 + error.signal());
     printLastLine(error.what());
     return 128 + error.signal();
