@@ -6,7 +6,7 @@
 #include <openvdb/Types.h>
 
 #include "ops/kernels/mesh/box_tree.h"
-#include "ops/kernels/mesh/mesh_edges.h"
+#include "ops/kernels/mesh/mesh_bodies.h"
 #include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
@@ -15,25 +15,51 @@ namespace vdbdither {
 /// passes them. The counts are exact: what a side contributes depends on the side alone, so that
 /// the crossings of any line cancel in a mesh whose sides meet opposite ones.
 ///
-/// Triangles that share sides form a body. A body is closed, so only those whose box holds a place
-/// are asked.
+/// A body is closed, so only those whose box holds a place are asked.
 class LineWinding {
  public:
   /// The numbers at both sides of a surface.
   struct Sides {
     int front = 0;  ///< where the normal points
     int back = 0;
+
+    Sides& operator+=(const Sides& other) {
+      front += other.front;
+      back += other.back;
+      return *this;
+    }
   };
 
-  /// `boxes` are those of the triangles, or larger. All three must outlive this.
-  LineWinding(const Mesh& mesh, const MeshEdges& edges, const std::vector<BoxTree::Box>& boxes);
+  /// The numbers of one body.
+  struct OfBody {
+    std::uint32_t body;
+    Sides sides;
+  };
+
+  /// `boxes` are those of the triangles, or larger. `mesh` and `boxes` must outlive this.
+  LineWinding(const Mesh& mesh, const MeshBodies& bodies, const std::vector<BoxTree::Box>& boxes);
 
   /// Returns the numbers at the distance `beside_mm` from a plane through p. `normal` is the unit
   /// normal of the plane.
   [[nodiscard]] Sides at(const openvdb::Vec3d& p, const openvdb::Vec3d& normal,
                          double beside_mm) const;
 
+  /// Returns the numbers of one body there.
+  [[nodiscard]] Sides ofBody(std::uint32_t body, const openvdb::Vec3d& p,
+                             const openvdb::Vec3d& normal, double beside_mm) const;
+
+  /// Returns the same for each body whose numbers there are not all zero.
+  [[nodiscard]] std::vector<OfBody> ofBodies(const openvdb::Vec3d& p, const openvdb::Vec3d& normal,
+                                             double beside_mm) const;
+
  private:
+  class Line;
+
+  /// Calls visit(body, sides) for each body whose box holds the place.
+  template <class Visit>
+  void visitBodies(const Line& line, const Visit& visit) const;
+  [[nodiscard]] Sides ofBody(std::uint32_t body, const Line& line) const;
+
   const Mesh& mesh_;
   std::vector<BoxTree::Box> body_boxes_;
   std::vector<BoxTree> triangles_;  ///< by body

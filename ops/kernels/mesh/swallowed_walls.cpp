@@ -15,6 +15,7 @@
 #include "ops/kernels/leaf/disjoint_sets.h"
 #include "ops/kernels/mesh/box_tree.h"
 #include "ops/kernels/mesh/line_winding.h"
+#include "ops/kernels/mesh/mesh_bodies.h"
 #include "ops/kernels/mesh/mesh_edges.h"
 #include "ops/kernels/mesh/progress_part.h"
 #include "ops/kernels/mesh/wall_cutter.h"
@@ -52,9 +53,9 @@ class Walls {
     return {normal, normal.dot(a)};
   }
   [[nodiscard]] DisjointSets findPatches() const;
-  /// Calls visit(other) for each triangle that may intersect one, until it returns false.
+  /// Calls visit(other) for each triangle near one, until it returns false.
   template <class Visit>
-  bool visitIntersecting(std::uint32_t triangle, const Visit& visit) const;
+  void visitNear(std::uint32_t triangle, const Visit& visit) const;
   [[nodiscard]] bool mayIntersect(std::uint32_t a, std::uint32_t b) const;
   [[nodiscard]] bool passes(std::uint32_t triangle, const Vec3d& from, const Vec3d& to) const;
   /// Whether triangles lie in one plane as far as their direction tells.
@@ -62,7 +63,7 @@ class Walls {
     return planes_[a].normal.cross(planes_[b].normal).length() <= 1e-6;
   }
   void addCuts(std::uint32_t triangle, std::uint32_t by, std::vector<WallCut>& cuts) const;
-  [[nodiscard]] std::vector<char> findCrossed() const;
+  void findCrossed();
   [[nodiscard]] std::vector<std::uint32_t> largestOfPatches(DisjointSets& patches) const;
   [[nodiscard]] std::vector<Left> cutCrossed(const LineWinding& winding) const;
 
@@ -73,6 +74,8 @@ class Walls {
   std::vector<BoxTree::Box> boxes_;
   BoxTree tree_;
   std::vector<char> crossed_;  ///< by triangle
+  MeshBodies bodies_;
+  std::vector<int> lowest_;  ///< the lowest numbers of the bodies
 };
 
 Walls::Walls(const Mesh& mesh)
@@ -81,7 +84,8 @@ Walls::Walls(const Mesh& mesh)
       count_(static_cast<std::uint32_t>(mesh.triangles.size())),
       planes_(count_),
       boxes_(count_),
-      crossed_(count_, 0) {
+      crossed_(count_, 0),
+      bodies_(mesh, edges_) {
   for (std::uint32_t t = 0; t < count_; ++t) {
     planes_[t] = planeOf(t);
     for (std::size_t c = 0; c < 3; ++c) boxes_[t].expand(corner(t, c));
@@ -104,14 +108,10 @@ DisjointSets Walls::findPatches() const {
 }
 
 template <class Visit>
-bool Walls::visitIntersecting(std::uint32_t triangle, const Visit& visit) const {
+void Walls::visitNear(std::uint32_t triangle, const Visit& visit) const {
   const BoxTree::Box& own = boxes_[triangle];
-  return tree_.visit([&](const BoxTree::Box& box) { return own.hasOverlap(box); },
-                     [&](std::uint32_t other) {
-                       return other == triangle ||
-                              !mayIntersect(std::min(triangle, other), std::max(triangle, other)) ||
-                              visit(other);
-                     });
+  tree_.visit([&](const BoxTree::Box& box) { return own.hasOverlap(box); },
+              [&](std::uint32_t other) { return other == triangle || visit(other); });
 }
 
 /// Whether a segment in the plane of a triangle passes through it, not along a side.
@@ -135,6 +135,7 @@ bool Walls::passes(std::uint32_t triangle, const Vec3d& from, const Vec3d& to) c
 /// through a side. Touching is not meeting, unless a side lies in the plane of the other triangle
 /// and passes through it: the neighbour at that side may go on beyond the plane.
 bool Walls::mayIntersect(std::uint32_t a, std::uint32_t b) const {
+  if (a > b) std::swap(a, b);  // the same for both
   bool one_plane = true;
   for (const auto& [by, other] : {std::pair(a, b), std::pair(b, a)}) {
     if (planes_[by].normal == Vec3d(0, 0, 0)) return false;
@@ -196,26 +197,35 @@ void Walls::addCuts(std::uint32_t triangle, std::uint32_t by, std::vector<WallCu
     if (is_flat) {
       Vec3d across = own.normal.cross(b - a);
       across.normalize();
-      cuts.push_back({a, b, {across, across.dot(a)}});
+      cuts.push_back({a, b, {across, across.dot(a)}, false, false, bodies_.of(by)});
     } else if (is_in[c] && is_in[next]) {
-      cuts.push_back({a, b, planes_[by], sum > 0, sum < 0});
+      cuts.push_back({a, b, planes_[by], sum > 0, sum < 0, bodies_.of(by)});
     } else if (is_in[c]) {
       ends[count++] = a;
     } else if (!is_in[next] && (height[c] > 0) != (height[next] > 0)) {
       ends[count++] = a + (b - a) * (height[c] / (height[c] - height[next]));
     }
   }
-  if (count == 2) cuts.push_back({ends[0], ends[1], planes_[by], true, true});
+  if (count == 2) cuts.push_back({ends[0], ends[1], planes_[by], true, true, bodies_.of(by)});
 }
 
-/// Returns by triangle whether another may intersect it.
-std::vector<char> Walls::findCrossed() const {
-  std::vector<char> crossed(count_);
+/// Finds the triangles that others may intersect, and the numbers of the bodies.
+void Walls::findCrossed() {
+  enum : char { by_none, by_other_bodies, by_its_own };
   forAll(count_, [&](std::size_t i) {
     const auto t = static_cast<std::uint32_t>(i);
-    crossed[t] = visitIntersecting(t, [](std::uint32_t) { return false; }) ? 0 : 1;
+    crossed_[t] = by_none;
+    visitNear(t, [&](std::uint32_t other) {
+      const bool is_own = bodies_.of(other) == bodies_.of(t);
+      if ((is_own || crossed_[t] == by_none) && mayIntersect(t, other))
+        crossed_[t] = is_own ? by_its_own : by_other_bodies;
+      return crossed_[t] != by_its_own;
+    });
   });
-  return crossed;
+  std::vector<char> crosses_itself(bodies_.count(), 0);
+  for (std::uint32_t t = 0; t < count_; ++t)
+    if (crossed_[t] == by_its_own) crosses_itself[bodies_.of(t)] = 1;
+  lowest_ = bodies_.lowestNumbers(mesh_, edges_, crosses_itself);
 }
 
 /// Returns the largest triangle of each patch: of what hangs together without being crossed.
@@ -250,31 +260,35 @@ std::vector<Walls::Left> Walls::cutCrossed(const LineWinding& winding) const {
     const Vec3d& normal = planes_[t].normal;
     std::vector<WallCut> cuts;
     bool is_opposed = false;
-    visitIntersecting(t, [&](std::uint32_t other) {
+    visitNear(t, [&](std::uint32_t other) {
+      if (!mayIntersect(t, other)) return true;
       addCuts(t, other, cuts);
       is_opposed |= isParallel(t, other) && normal.dot(planes_[other].normal) < 0;
       return true;
     });
-    left[i].surface = WallCutter(winding, normal, is_opposed).cut(wholeOf(t), cuts, left[i].pieces);
+    left[i].surface = WallCutter(winding, lowest_, normal, is_opposed)
+                          .cut(wholeOf(t), std::move(cuts), left[i].pieces);
   });
   return left;
 }
 
 SwallowedWalls Walls::find() {
   SwallowedWalls walls;
-  crossed_ = findCrossed();
+  findCrossed();
   DisjointSets patches = findPatches();
   const std::vector<std::uint32_t> largest = largestOfPatches(patches);
-  const bool none_crossed = std::find(crossed_.begin(), crossed_.end(), 1) == crossed_.end();
+  const bool none_crossed =
+      std::all_of(crossed_.begin(), crossed_.end(), [](char by) { return by == 0; });
   if (none_crossed && largest.size() < 2) return walls;
 
-  const LineWinding winding(mesh_, edges_, boxes_);
+  const LineWinding winding(mesh_, bodies_, boxes_);
   std::vector<char> surface(count_, 1);  // of patches, by their root
   std::vector<char> is_surface(largest.size());
   forAll(largest.size(), [&](std::size_t i) {
     const std::uint32_t t = largest[i];
     is_surface[i] =
-        WallCutter(winding, planes_[t].normal, true).isSurface(middleOf(wholeOf(t))) ? 1 : 0;
+        WallCutter(winding, lowest_, planes_[t].normal, true).isSurface(middleOf(wholeOf(t))) ? 1
+                                                                                              : 0;
   });
   for (std::size_t i = 0; i < largest.size(); ++i)
     surface[patches.find(largest[i])] = is_surface[i];

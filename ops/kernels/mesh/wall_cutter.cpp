@@ -95,6 +95,12 @@ std::optional<WallPlane> planeBetween(const Cuts& cuts) {
   return parts ? std::optional(plane) : std::nullopt;
 }
 
+/// Returns by how much the number of a body may fall, at most once at each of some segments.
+int largestFall(int number, int segments, int lowest) {
+  const bool is_known = number == lowest || number == lowest + 1;
+  return is_known ? std::min(segments, number - lowest) : segments;
+}
+
 }  // namespace
 
 Vec3d middleOf(const WallPiece& piece) {
@@ -108,39 +114,63 @@ bool WallCutter::isSurface(const Vec3d& p) const {
   return (sides.front != 0) != (sides.back != 0);
 }
 
-/// Returns how much of a wall is surface where the number at its middle tells; otherwise leaves out
+/// Judges a wall without segments by the numbers at its middle.
+WallCutter::Surface WallCutter::surfaceBy(const Numbers& numbers) {
+  const bool is_solid_in_front = numbers.here.front != 0;
+  const bool is_solid_behind = numbers.is_front_enough || numbers.here.back != 0;
+  return is_solid_in_front != is_solid_behind ? Surface::all : Surface::none;
+}
+
+/// Returns how much of a wall is surface where the numbers at its middle tell; otherwise leaves out
 /// the segments that cannot matter. On the straight way from the middle to any place each segment
-/// is passed at most once, so the number cannot fall by more than one at each segment that lies
-/// above the middle's side.
-std::optional<WallCutter::Surface> WallCutter::judge(const Vec3d& middle, Cuts& cuts) const {
-  const LineWinding::Sides sides = winding_.at(middle, normal_, beside_mm);
-  int front = sides.front;
-  int back = sides.back;
+/// is passed at most once, so the number of a body cannot fall by more than one at each of its
+/// segments that lies above the middle's side, nor below the lowest number of the body.
+std::optional<WallCutter::Surface> WallCutter::judge(const Vec3d& middle, Cuts& cuts,
+                                                     Numbers& numbers) const {
+  Numbers next = numbers;
+  next.open.clear();
+  next.here = numbers.settled;
+  LineWinding::Sides least = numbers.settled;
   bool front_changes = false;
-  for (const WallCut& cut : cuts) {
-    const bool may_fall = cut.plane.at(middle) < 2 * beside_mm;
-    front -= cut.in_front && may_fall ? 1 : 0;
-    back -= cut.behind && may_fall ? 1 : 0;
-    front_changes |= cut.in_front;
+  auto cut = cuts.begin();
+  for (const std::uint32_t body : numbers.open) {
+    const LineWinding::Sides here = winding_.ofBody(body, middle, normal_, beside_mm);
+    LineWinding::Sides falls;
+    bool changes = false;
+    for (; cut != cuts.end() && cut->body == body; ++cut) {
+      const bool may_fall = cut->plane.at(middle) < 2 * beside_mm;
+      falls.front += cut->in_front && may_fall ? 1 : 0;
+      falls.back += cut->behind && may_fall ? 1 : 0;
+      front_changes |= cut->in_front;
+      changes = true;
+    }
+    if (changes) {
+      next.open.push_back(body);
+    } else {
+      next.settled += here;
+    }
+    next.here += here;
+    least.front += here.front - largestFall(here.front, falls.front, lowest_[body]);
+    least.back += here.back - largestFall(here.back, falls.back, lowest_[body]);
   }
-  if (front > 0 && back > 0) return Surface::none;
-  if (is_opposed_ || front < 0) return std::nullopt;
+  numbers = std::move(next);
+  if (cuts.empty()) return surfaceBy(numbers);
+  if (least.front > 0 && least.back > 0) return Surface::none;
+  if (is_opposed_ || least.front < 0) return std::nullopt;
   // The number behind is greater than that in front by the triangles in the plane.
-  if (front > 0) return Surface::none;
+  if (least.front > 0) return Surface::none;
   if (!front_changes) return Surface::all;
-  std::erase_if(cuts, [](const WallCut& cut) { return !cut.in_front; });
+  numbers.is_front_enough = true;
+  std::erase_if(cuts, [](const WallCut& each) { return !each.in_front; });
   return std::nullopt;
 }
 
-WallCutter::Surface WallCutter::divide(const WallPiece& wall, Cuts cuts,
+WallCutter::Surface WallCutter::divide(const WallPiece& wall, Cuts cuts, Numbers numbers,
                                        std::vector<WallPiece>& pieces) const {
   throwIfInterrupted();
-  const Vec3d middle = middleOf(wall);
-  if (cuts.size() > 1) {
-    const std::optional<Surface> judged = judge(middle, cuts);
-    if (judged == Surface::all) pieces.push_back(wall);
-    if (judged) return *judged;
-  }
+  std::optional<Surface> judged = judge(middleOf(wall), cuts, numbers);
+  if (judged == Surface::all) pieces.push_back(wall);
+  if (judged) return *judged;
   std::optional<std::array<WallPiece, 2>> halves;
   WallPlane plane;
   if (const std::optional<WallPlane> between = planeBetween(cuts)) {
@@ -157,15 +187,15 @@ WallCutter::Surface WallCutter::divide(const WallPiece& wall, Cuts cuts,
     if (!halves) cuts.erase(longest);
   }
   if (!halves) {
-    if (!isSurface(middle)) return Surface::none;
-    pieces.push_back(wall);
-    return Surface::all;
+    judged = surfaceBy(numbers);
+    if (judged == Surface::all) pieces.push_back(wall);
+    return *judged;
   }
   std::array<Cuts, 2> parted = halvesOf(cuts, plane);
   Cuts().swap(cuts);
   const std::size_t before = pieces.size();
-  const Surface above = divide((*halves)[0], std::move(parted[0]), pieces);
-  const Surface below = divide((*halves)[1], std::move(parted[1]), pieces);
+  const Surface above = divide((*halves)[0], std::move(parted[0]), numbers, pieces);
+  const Surface below = divide((*halves)[1], std::move(parted[1]), std::move(numbers), pieces);
   if (above != below) return Surface::some;
   if (above == Surface::all) {
     pieces.resize(before);
@@ -174,16 +204,23 @@ WallCutter::Surface WallCutter::divide(const WallPiece& wall, Cuts cuts,
   return above;
 }
 
-WallCutter::Surface WallCutter::cut(const WallPiece& wall, const Cuts& cuts,
+WallCutter::Surface WallCutter::cut(const WallPiece& wall, Cuts cuts,
                                     std::vector<WallPiece>& pieces) const {
-  Cuts within = cuts;
   for (std::size_t side = 0; side < wall.size(); ++side) {
     const Vec3d& a = wall[side];
     Vec3d inwards = normal_.cross(wall[(side + 1) % wall.size()] - a);
     inwards.normalize();
-    within = std::move(halvesOf(within, {inwards, inwards.dot(a)})[0]);
+    cuts = std::move(halvesOf(cuts, {inwards, inwards.dot(a)})[0]);
   }
-  return divide(wall, std::move(within), pieces);
+  std::stable_sort(cuts.begin(), cuts.end(),
+                   [](const WallCut& a, const WallCut& b) { return a.body < b.body; });
+  Numbers numbers;
+  for (const WallCut& each : cuts)
+    if (numbers.open.empty() || each.body != numbers.open.back()) numbers.open.push_back(each.body);
+  for (const auto& [body, sides] : winding_.ofBodies(middleOf(wall), normal_, beside_mm))
+    if (!std::binary_search(numbers.open.begin(), numbers.open.end(), body))
+      numbers.settled += sides;
+  return divide(wall, std::move(cuts), std::move(numbers), pieces);
 }
 
 }  // namespace vdbdither

@@ -1,11 +1,13 @@
 #include "tests/bench/mesh_robustness/wall_costs.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <ctime>
+#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
@@ -60,6 +62,39 @@ Mesh inOnePlace(int index, int /*count*/, std::mt19937& random) {
                    random);
 }
 
+/// A prism of eight sides.
+Mesh rod(const Vec3d& from, const Vec3d& to, double radius) {
+  constexpr std::uint32_t sides = 8;
+  const Vec3d along = (to - from).unit();
+  const Vec3d across = along.getArbPerpendicular();
+  const Vec3d aside = along.cross(across);
+  Mesh mesh;
+  mesh.vertices = {from, to};
+  for (std::uint32_t i = 0; i < sides; ++i) {
+    const double angle = 2 * std::numbers::pi * i / sides;
+    const Vec3d out = radius * (std::cos(angle) * across + std::sin(angle) * aside);
+    mesh.vertices.push_back(from + out);
+    mesh.vertices.push_back(to + out);
+    const std::uint32_t low = 2 + 2 * i;
+    const std::uint32_t next = 2 + 2 * ((i + 1) % sides);
+    mesh.triangles.insert(
+        mesh.triangles.end(),
+        {{0, next, low}, {1, low + 1, next + 1}, {low, next, next + 1}, {low, next + 1, low + 1}});
+  }
+  return mesh;
+}
+
+/// Rods between the corners of cubes and along their diagonals, as in a light structure.
+Mesh ofALattice(int index, int count, std::mt19937& /*random*/) {
+  static const std::array<Vec3d, 7> ways{Vec3d(1, 0, 0), Vec3d(0, 1, 0),  Vec3d(0, 0, 1),
+                                         Vec3d(1, 1, 1), Vec3d(-1, 1, 1), Vec3d(1, -1, 1),
+                                         Vec3d(1, 1, -1)};
+  const int edge = static_cast<int>(std::ceil(std::cbrt(count / 7.0)));
+  const int cell = index / 7;
+  const Vec3d corner(cell % edge, cell / edge % edge, std::floor(cell / (edge * edge)));
+  return rod(corner, corner + ways[static_cast<std::size_t>(index % 7)], 0.1);
+}
+
 struct Row {
   const char* name;
   Shell shell;
@@ -93,6 +128,7 @@ void printWallCosts() {
   for (const int count : {1000, 4000, 16000}) rows.push_back({"on one plane", onAPlane, count});
   for (const int count : {1000, 4000, 16000}) rows.push_back({"face to face", faceToFace, count});
   for (const int count : {80, 160, 320}) rows.push_back({"in one place", inOnePlace, count});
+  for (const int count : {189, 448, 1512}) rows.push_back({"of a lattice", ofALattice, count});
   for (Row& row : rows) {
     std::mt19937 random(1);
     std::vector<Mesh> shells;

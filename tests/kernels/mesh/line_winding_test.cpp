@@ -25,7 +25,7 @@ class Numbers {
       : mesh_(std::move(mesh)),
         edges_(mesh_),
         boxes_(boxesOf(mesh_)),
-        lines_(mesh_, edges_, boxes_) {}
+        lines_(mesh_, MeshBodies(mesh_, edges_), boxes_) {}
 
   [[nodiscard]] LineWinding::Sides at(const Vec3d& p, const Vec3d& normal) const {
     return lines_.at(p, normal, beside_mm);
