@@ -21,6 +21,7 @@
 #include "ops/kernels/mesh/mesh_measures.h"
 #include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/solid_mesh.h"
+#include "ops/kernels/mesh/solid_volume.h"
 #include "ops/kernels/mesh/taubin.h"
 #include "ops/kernels/picture/diverging_colours.h"
 #include "vdbdither/engine/json_text.h"
@@ -234,13 +235,16 @@ class SurfaceMeasurement {
     if (given.on_bed) placement.corner_mm = bedCornerMm(*lattice);
     place(mesh, placement);
     // Errors are measured to the triangles given, so that nothing is guessed in their place.
-    SolidMesh solid = solidMesh(std::move(mesh), {.guess = false, .find_walls = false});
+    SolidMesh solid = solidMesh(std::move(mesh), {.guess = false});
     if (solid.mesh.triangles.empty())
       throw DataError(
           "--reference: the mesh has no surface: all its triangles are degenerate or "
           "cancel");
+    // Walls within the reference are no fault of it.
+    solid.report.repairs.swallowed_triangles = solid.report.repairs.cut_triangles = 0;
     for (const std::string& line : solid.report.repairs.lines())
       reporter.warn("--reference: " + line);
+    reference_volume_mm3_ = volumeOf(solid);
     reference_.emplace(std::move(solid.mesh));
   }
 
@@ -252,6 +256,7 @@ class SurfaceMeasurement {
     all["surface"]["of"] = of;
     all["surface"]["smoothing"] = smooths() ? smoothing_.iterations : 0;
     all["reference"] = json(reference_->mesh());
+    all["reference"]["volume_mm3"] = reference_volume_mm3_;
     all["reference"]["of"] = reference_file_;
     const double volume = all["surface"]["volume_mm3"];
     const double wanted = all["reference"]["volume_mm3"];
@@ -306,6 +311,7 @@ class SurfaceMeasurement {
   OverwriteOption overwrite_;
 
   std::optional<ClosestPoints> reference_;
+  double reference_volume_mm3_ = 0;  ///< where shells overlap counted once
 };
 
 /// The surface of a grid.

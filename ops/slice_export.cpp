@@ -111,7 +111,7 @@ class SliceExport : public Sink {
     };
     planFrame(frame_, in.lattice.box, *format_, printer_, warn, stack_);
     checkPrinterTakes(*format_, printer_, stack_);
-    minimum_layers_ = format_->showsColours() ? printer_.minimum_slices : 0;
+    minimum_layers_ = printer_.minimum_slices;
     encoder_->plan(stack_, in.grids);
     if (frame_.crop && !encoder_->reads().empty()) {
       throw UsageError("--crop: " + format_name_ +
@@ -384,8 +384,8 @@ class SliceExport : public Sink {
     const openvdb::CoordBBox printed = in.grids.at(stack_.grid)->evalActiveVoxelBoundingBox();
     if (printed.empty() || !cuts(printed)) return;
     throw DataError(
-        "the part reaches beyond the display or tray; make it smaller, or give --tray "
-        "centred");
+        std::string("the part reaches beyond the display or tray; make it smaller, ") +
+        (frame_.tray == Tray::placed ? "or give --tray centred" : "turn it, or give --tray none"));
   }
 
   [[nodiscard]] std::vector<SpanImage> slices(const Slab& in, ZRange layers,

@@ -107,7 +107,7 @@ void tellLeftOut(const std::vector<std::string>& all, std::vector<std::string> s
 
 bool EmptyPixels::contains(std::uint32_t colour) const {
   if (colour >> 24 == 0) return true;
-  if (is_mask) return ((colour & 255) > 127) == (background == rgba(255, 255, 255));
+  if (is_mask && background) return ((colour & 255) > 127) == (background == rgba(255, 255, 255));
   return colour == background;
 }
 

@@ -15,7 +15,7 @@ namespace vdbdither {
 /// Which pixels of images without a manifest are empty.
 struct EmptyPixels {
   std::optional<std::uint32_t> background;  ///< as rgba() makes it; nothing: the transparent ones
-  bool is_mask = false;                     ///< images are grey, and grey is split in the middle
+  bool is_mask = false;  ///< images are grey; grey is split in the middle if there is a background
 
   [[nodiscard]] bool contains(std::uint32_t colour) const;
 };

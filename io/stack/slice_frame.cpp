@@ -154,13 +154,14 @@ void checkPrinterTakes(const SliceFormat& format, const PrinterProfile& printer,
     throw UsageError("--format: " + printer.title + " takes " + what + "; " + remedy);
   };
   const int colours = static_cast<int>(stack.materials.size());
-  if (format.showsColours() && printer.maximum_colours > 0 && colours > printer.maximum_colours) {
+  const bool holds_materials = format.pixel != SlicePixel::printed;
+  if (holds_materials && printer.maximum_colours > 0 && colours > printer.maximum_colours) {
     refuse("at most " + std::to_string(printer.maximum_colours) + " materials, and there are " +
                std::to_string(colours),
            "assign fewer with material-assign");
   }
   const int layers = stack.lattice.layers().size();
-  if (format.showsColours() && layers < printer.minimum_slices) {
+  if (layers < printer.minimum_slices) {
     refuse("at least " + std::to_string(printer.minimum_slices) + " slices, and there are " +
                std::to_string(layers),
            "the part is too low");

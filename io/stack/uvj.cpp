@@ -127,6 +127,12 @@ std::optional<DescribedStack> describeUvj(const StackInput& files) {
   if (!files.contains(configuration_name)) return std::nullopt;
   const std::string shown = "'" + files.shown(configuration_name) + "'";
   const ordered_json json = configurationOf(files);
+  const std::string first_slice = folder + zeroPadded(0, number_digits) + ".png";
+  if (!json.is_object() && files.contains(first_slice)) {
+    throw DataError(shown +
+                    " is not a JSON object, so the size of the voxels is not known; get the "
+                    "file again");
+  }
   // Others call their settings so too.
   if (!json.is_object() || !json.contains("Properties") || !json.contains("Layers"))
     return std::nullopt;

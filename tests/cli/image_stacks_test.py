@@ -169,6 +169,11 @@ class ImageStacks(ProgramTest):
         self.refuse_import("--background: 'out/a1.png' is grey; give black or white", *PITCH, "--background", "#808080", code=2)
         self.imported("--materials", "palette")
         self.assertEqual(len(self.materials()), 3)
+        self.draw("a1.png", [[(0, 255), (77, 255), (77, 0), (255, 255)]], "LA")
+        self.assertEqual(set(self.imported()), {"solid"})
+        self.assertEqual(set(self.voxels(self.imported()["solid"])), {(0, 0, 0), (1, 0, 0), (3, 0, 0)}, "opacity alone tells")
+        self.assertEqual(set(self.voxels(self.imported("--background", "black")["solid"])), {(3, 0, 0)})
+        self.assertEqual(set(self.voxels(self.imported("--background", "white")["solid"])), {(0, 0, 0), (1, 0, 0)})
         for name in ("a1.png", "a1.tif"):
             (self.out / "a1.png").unlink(missing_ok=True)
             Image.fromarray(numpy.array([[0, 32767, 32768, 65535]], numpy.uint16)).save(self.out / name)

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/mesh/mesh_reader.h"
+#include "ops/kernels/mesh/mesh_placement.h"
 #include "ops/kernels/mesh/taubin.h"
 #include "tests/support/drawn_grids.h"
 #include "tests/support/filters.h"
@@ -74,6 +75,20 @@ TEST_F(Measure, AMeshOfItsOwnIsMeasuredWithoutAChain) {
   EXPECT_NEAR(measuring.said.counts.at("p50_mm"), 0.01, 1e-6);
   const Mesh map = readMesh(scratch / "map.ply", {});
   EXPECT_EQ(map.triangles.size(), 12U);
+}
+
+TEST_F(Measure, WhereShellsOfTheReferenceOverlapTheVolumeCountsOnce) {
+  // Two boxes, one half in the other, and a third within them that faces outwards.
+  save(joined({test::boxMesh({0, 0, 0}, {2, 2, 1}), test::boxMesh({1, 0.5, 0}, {3, 1.5, 1}),
+               test::boxMesh({0.5, 0.5, 0.25}, {1, 1, 0.75})}),
+       "overlap.stl");
+  save(test::boxMesh({0, 0, 0}, {2, 2, 1}), "result.stl");
+  const MeasuringMesh measuring(
+      {file("result.stl"), "--reference", file("overlap.stl"), "--report", file("report.json")});
+  measuring.run();
+  const nlohmann::json report = jsonOf(scratch / "report.json");
+  EXPECT_NEAR(report["reference"]["volume_mm3"], 5, 5e-5);
+  EXPECT_NEAR(report["volume_error_mm3"], -1, 5e-5);
 }
 
 TEST_F(Measure, VoxelsAreMeasuredAsTheyComeWithTheirPiecesAndCavities) {

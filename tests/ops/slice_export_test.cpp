@@ -170,12 +170,17 @@ TEST(SliceExport, APartThatReachesBeyondTheTrayIsRefused) {
   for (const auto& layers : {std::vector<std::vector<std::string>>{{"1........2"}},
                              {{"1....."}, {"1....."}, {"1....."}, {"1....."}, {"1........2"}}}) {
     job.grids["material"] = drawnMaterial(layers, 4);
-    EXPECT_THAT(
-        [&] {
-          Export({scratch / "out", "--tray", "placed"}).run(job);
-        },
-        ThrowsMessage<DataError>("the part reaches beyond the display or tray; make it "
-                                 "smaller, or give --tray centred"));
+    const auto refusalOf = [&](const std::string& tray, const std::string& remedy) {
+      EXPECT_THAT(
+          [&] {
+            Export({scratch / "out", "--tray", tray}).run(job);
+          },
+          ThrowsMessage<DataError>("the part reaches beyond the display or tray; make it "
+                                   "smaller, " +
+                                   remedy));
+    };
+    refusalOf("placed", "or give --tray centred");
+    refusalOf("centred", "turn it, or give --tray none");
   }
 }
 
@@ -184,11 +189,13 @@ TEST(SliceExport, AJobForAPrinterHasItsMinimumOfSlices) {
   Job job = jobOf(drawnMaterial({{"1"}, {"1"}}, 4), CoordBBox(Coord(0, 0, 0), Coord(0, 0, 40)));
   job.schema.metadata["vdbdither:printer"] =
       R"({"name":"p","pitch_mm":[0.042,0.084,0.022],"minimum_slices":30,"materials":[]})";
-  Export({scratch / "out"}).run(job);
-  const auto manifest = nlohmann::json::parse(fileBytes(scratch / "out/manifest.json"));
-  EXPECT_EQ(manifest["size"][2], 30);
-  EXPECT_EQ(manifest["first_layer"], 4);
-  EXPECT_EQ(manifest["cropped"]["above"], 7);
+  for (const std::string format : {"png", "png1", "png8", "tiff"}) {
+    Export({scratch / format, "--format", format}).run(job);
+    const auto manifest = nlohmann::json::parse(fileBytes(scratch / format / "manifest.json"));
+    EXPECT_EQ(manifest["size"][2], 30) << format;
+    EXPECT_EQ(manifest["first_layer"], 4) << format;
+    EXPECT_EQ(manifest["cropped"]["above"], 7) << format;
+  }
 }
 
 TEST(SliceExport, NamesOrientationPaddingAndBackgroundAreOptions) {

@@ -149,6 +149,10 @@ TEST_F(Containers, AUvjOfOthersIsReadAsItsConfigurationSays) {
   EXPECT_EQ(refusal(), "'config.json': '/Properties/Size/Y' must be a number");
   scratch_.write("config.json", replaced(uvj_text, "\"Y\": 2", "\"Y\": 0.5"));
   EXPECT_EQ(refusal(), "'config.json': '/Properties/Size/Y' must be from 1 to 16777216");
+  scratch_.write("config.json", std::string(uvj_text).substr(0, 60));
+  EXPECT_EQ(refusal(),
+            "'config.json' is not a JSON object, so the size of the voxels is not known; "
+            "get the file again");
   scratch_.write("config.json", R"({"colour": "red"})");
   EXPECT_THAT(refusal(), EndsWith("holds no manifest.json, so it is not a stack made by "
                                   "slice-export"));

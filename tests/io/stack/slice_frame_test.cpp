@@ -132,11 +132,15 @@ TEST(PrinterLimits, MaterialsAndSlicesAreCounted) {
   EXPECT_THAT([&] { checkPrinterTakes(png, printer, stack); },
               ThrowsMessage<UsageError>("--format: A display takes at least 30 slices, and there "
                                         "are 29; the part is too low"));
-  EXPECT_NO_THROW(checkPrinterTakes(*findSliceFormat("sl1"), printer, stack));
+  EXPECT_THROW(checkPrinterTakes(*findSliceFormat("sl1"), printer, stack), UsageError);
+  stack.lattice.box.max().z() = 29;
   stack.materials.push_back({"c", {}});
-  EXPECT_THAT([&] { checkPrinterTakes(png, printer, stack); },
-              ThrowsMessage<UsageError>("--format: A display takes at most 2 materials, and there "
-                                        "are 3; assign fewer with material-assign"));
+  for (const char* name : {"png", "png1"}) {
+    EXPECT_THAT([&] { checkPrinterTakes(*findSliceFormat(name), printer, stack); },
+                ThrowsMessage<UsageError>("--format: A display takes at most 2 materials, and "
+                                          "there are 3; assign fewer with material-assign"));
+  }
+  EXPECT_NO_THROW(checkPrinterTakes(*findSliceFormat("sl1"), printer, stack)) << "shows none";
 }
 
 }  // namespace
