@@ -113,7 +113,8 @@ std::vector<std::string> GridListOption::list() const {
 
 void SurfaceGridOption::declare(Options& options) {
   options.text("grid", grid, "NAME",
-               "Grid whose surface is taken: of solid its voxels, of surface and displaced a level "
+               "Grid whose surface is taken: of solid the steps of its voxels with cut corners, of "
+               "surface and displaced a level "
                "of the distance, of printed a level of the share of material",
                {"auto", "The first of printed, solid, displaced and surface that there is"});
 }
