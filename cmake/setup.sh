@@ -39,11 +39,12 @@ watched() {
   if [ -t 2 ]; then "$@" >&2 </dev/null; else quietly "$@"; fi
 }
 
-# Runs ctest with the arguments and shows the tests that did not pass; on a terminal also how many have run.
+# Runs ctest with the arguments and shows the tests that did not pass; on a terminal also how many have run. One test more than
+# there are cores runs at a time, because many tests wait.
 run_tests() {
   local terminal=0
   if [ -t 2 ]; then terminal=1; fi
-  ctest "$@" </dev/null | awk -v terminal="$terminal" '
+  ctest --parallel "$((jobs + 1))" "$@" </dev/null | awk -v terminal="$terminal" '
     $1 == "Start" { next }
     / Passed / { if (terminal) printf "\r[%s] ", $1 >"/dev/stderr"; next }
     { print }'

@@ -20,7 +20,7 @@ excluded=$(grep --invert-match --extended-regexp '^(#|$)' tests/support/coverage
   paste --serial --delimiters='|')
 say "running the tests"
 status=0
-LLVM_PROFILE_FILE="$build/counts/%4m.profraw" run_tests --preset coverage --parallel "$jobs" \
+LLVM_PROFILE_FILE="$build/counts/%4m.profraw" run_tests --preset coverage \
   --exclude-regex "^(${excluded:-none})\$" "$@" || status=$?
 
 llvm-profdata-14 merge --sparse --output "$build/counts/all.profdata" "$build"/counts/*.profraw

@@ -7,4 +7,4 @@ install_packages "${program_packages[@]}" "${test_packages[@]}"
 build_release
 
 say "running the tests"
-run_tests --preset release --parallel "$jobs" "$@"
+run_tests --preset release "$@"

@@ -61,6 +61,5 @@ if [ "$preset" = asan ]; then
   ASAN_OPTIONS=strict_init_order=1:check_initialization_order=1 quietly build/asan/vdbdither --version
 fi
 
-# A test that takes seconds without them takes a minute with them: no more at a time than there are cores.
 say "running the tests"
-run_tests --preset "$preset" --parallel "$jobs" --exclude-regex "^(${excluded:-none})\$" "$@"
+run_tests --preset "$preset" --exclude-regex "^(${excluded:-none})\$" "$@"

@@ -14,7 +14,7 @@ import meshes
 from program import ProgramTest
 
 FUZZERS = os.environ.get("VDBDITHER_FUZZERS", "")
-SECONDS = int(os.environ.get("VDBDITHER_FUZZ_SECONDS", "10"))
+SECONDS = int(os.environ.get("VDBDITHER_FUZZ_SECONDS", "5"))
 # Keeps the units of each fuzzer, what it says, and what it finds.
 KEPT = os.environ.get("VDBDITHER_FUZZ_FOLDER", "")
 
