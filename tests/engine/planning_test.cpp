@@ -85,7 +85,7 @@ TEST(Planning, InputsAreDeclaredAndTheirMemoryCounts) {
 
 TEST(Planning, SlabsAreAsTallAsMemoryAllows) {
   const std::string line = "numbers --top 900 ! keep --explain";
-  EXPECT_EQ(planOf(line).slab_layers, 64);
+  EXPECT_EQ(planOf(line).slab_layers, 128);
   EXPECT_EQ(planOf(line + " --memory 1MiB").slab_layers, 8);
   EXPECT_EQ(planOf(line + " --slab 24").slab_layers, 24);
   EXPECT_EQ(planOf(line + " --slab all").slab_layers, 904);

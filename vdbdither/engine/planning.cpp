@@ -13,7 +13,7 @@ namespace {
 
 using Kind = StagePlan::Kind;
 
-constexpr int tallest_auto_slab = 64;
+constexpr int tallest_auto_slab = 128;
 
 /// `text` is A:B, counted from the first of `all`, or empty for all of them.
 ZRange parseLayers(const std::string& text, ZRange all) {

@@ -64,7 +64,7 @@ void RunOptions::declare(Options& options) {
       "slab", "N", [this](const std::string& text) { slab = checkedSlab(text); },
       [this] { return slab; }, "Number of layers worked on at a time, a multiple of 8");
   options.words(
-      {{"auto", "As many as the memory allows, up to 64"}, {"all", "All layers at once"}});
+      {{"auto", "As many as the memory allows, up to 128"}, {"all", "All layers at once"}});
   options.parsed(
       "memory", "SIZE",
       [this](const std::string& text) {

@@ -7,7 +7,9 @@
 #include <emmintrin.h>
 #endif
 
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace vdbdither {
@@ -18,54 +20,100 @@ namespace {
 
 constexpr float no_sample = std::numeric_limits<float>::infinity();
 
-inline FloatBits isSample(Floats values) { return (values < no_sample) & (values > -no_sample); }
-
-inline Floats slope(const float* at, int stride, float per_pitch) {
-  const Floats below = loadFloats(at - stride);
-  const Floats centre = loadFloats(at);
-  const Floats above = loadFloats(at + stride);
-  const FloatBits has_below = isSample(below);
-  const FloatBits has_above = isSample(above);
-  const Floats rise = (has_above ? above : centre) - (has_below ? below : centre);
-  const Floats whole = Floats{} + per_pitch;
-  return rise * ((has_above & has_below) ? 0.5F * whole : whole);
+template <typename Lanes>
+[[gnu::always_inline]] inline void load(const float* from, Lanes& values) {
+  std::memcpy(&values, from, sizeof values);
 }
 
-inline Floats root(Floats values) {
+template <typename Lanes>
+[[gnu::always_inline]] inline void findSlope(const float* at, int stride, float per_pitch,
+                                             Lanes& slope) {
+  Lanes below, centre, above;
+  load(at - stride, below);
+  load(at, centre);
+  load(at + stride, above);
+  const auto has_below = (below < no_sample) & (below > -no_sample);
+  const auto has_above = (above < no_sample) & (above > -no_sample);
+  const Lanes rise = (has_above ? above : centre) - (has_below ? below : centre);
+  const Lanes whole = Lanes{} + per_pitch;
+  slope = rise * ((has_above & has_below) ? 0.5F * whole : whole);
+}
+
+[[gnu::always_inline]] inline void takeRoot(Floats& values) {
 #ifdef __SSE2__
-  return _mm_sqrt_ps(values);
+  values = _mm_sqrt_ps(values);
 #else
   for (int lane = 0; lane < 4; ++lane) values[lane] = std::sqrt(values[lane]);
-  return values;
 #endif
 }
 
-/// By component, the normals of four voxels, the first at `at`.
-inline std::array<Floats, 3> unitGradients(const float* at, const openvdb::Vec3f& per_pitch) {
-  const Floats x = slope(at, LeafSurroundings::stride_x, per_pitch[0]);
-  const Floats y = slope(at, LeafSurroundings::stride_y, per_pitch[1]);
-  const Floats z = slope(at, LeafSurroundings::stride_z, per_pitch[2]);
-  const Floats length = root(x * x + y * y + z * z);
-  const Floats divisor = length > 0.0F ? length : Floats{} + no_sample;
-  return {x / divisor, y / divisor, z / divisor};
+[[gnu::always_inline]] inline void takeRoot(EightFloats& values) {
+  Floats low = __builtin_shufflevector(values, values, 0, 1, 2, 3);
+  Floats high = __builtin_shufflevector(values, values, 4, 5, 6, 7);
+  takeRoot(low);
+  takeRoot(high);
+  values = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+/// By component, the normals of as many voxels as there are lanes, the first at `at`.
+template <typename Lanes>
+[[gnu::always_inline]] inline void findUnitGradients(const float* at,
+                                                     const openvdb::Vec3f& per_pitch,
+                                                     std::array<Lanes, 3>& normals) {
+  findSlope(at, LeafSurroundings::stride_x, per_pitch[0], normals[0]);
+  findSlope(at, LeafSurroundings::stride_y, per_pitch[1], normals[1]);
+  findSlope(at, LeafSurroundings::stride_z, per_pitch[2], normals[2]);
+  Lanes length = normals[0] * normals[0] + normals[1] * normals[1] + normals[2] * normals[2];
+  takeRoot(length);
+  const Lanes divisor = length > 0.0F ? length : Lanes{} + no_sample;
+  for (Lanes& component : normals) component /= divisor;
 }
 
 }  // namespace
 
-LeafNormals::LeafNormals(const openvdb::FloatTree& surface, const openvdb::Vec3d& pitch_mm,
-                         ZRange valid)
-    : around_(surface, valid), per_pitch_(openvdb::Vec3d(1.0) / pitch_mm) {}
+/// The rows, compiled for each instruction set.
+struct LeafNormals::Loops {
+  template <typename Lanes>
+  [[gnu::always_inline]] static void makeRows(const LeafNormals& leaf, std::uint64_t rows,
+                                              Row* out) {
+    constexpr std::size_t lanes = sizeof(Lanes) / sizeof(float);
+    for (; rows != 0; rows &= rows - 1) {
+      const auto row = static_cast<unsigned>(std::countr_zero(rows));
+      for (std::size_t z = 0; z < 8; z += lanes) {
+        std::array<Lanes, 3> normals;
+        findUnitGradients(leaf.around_.at(8 * row) + z, leaf.per_pitch_, normals);
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          std::memcpy(&out[row][axis][z], &normals[axis], sizeof normals[axis]);
+      }
+    }
+  }
 
-Vec3s LeafNormals::normal(unsigned offset) const {
-  const std::array<Floats, 3> normals = unitGradients(around_.at(offset), per_pitch_);
-  return {normals[0][0], normals[1][0], normals[2][0]};
+  static void makeRowsBaseline(const LeafNormals& leaf, std::uint64_t rows, Row* out) {
+    makeRows<Floats>(leaf, rows, out);
+  }
+
+#if defined(__x86_64__)
+  [[gnu::target("avx2")]] static void makeRowsAvx2(const LeafNormals& leaf, std::uint64_t rows,
+                                                   Row* out) {
+    makeRows<EightFloats>(leaf, rows, out);
+  }
+#endif
+};
+
+LeafNormals::LeafNormals(const openvdb::FloatTree& surface, const openvdb::Vec3d& pitch_mm,
+                         ZRange valid, [[maybe_unused]] InstructionSet instructions)
+    : around_(surface, valid),
+      per_pitch_(openvdb::Vec3d(1.0) / pitch_mm),
+      make_rows_(&Loops::makeRowsBaseline) {
+#if defined(__x86_64__)
+  if (instructions == InstructionSet::avx2) make_rows_ = &Loops::makeRowsAvx2;
+#endif
 }
 
-void LeafNormals::makeRow(unsigned offset, Row& row) const {
-  for (std::size_t z = 0; z < 8; z += 4) {
-    const std::array<Floats, 3> normals = unitGradients(around_.at(offset) + z, per_pitch_);
-    for (std::size_t axis = 0; axis < 3; ++axis) storeFloats(&row[axis][z], normals[axis]);
-  }
+Vec3s LeafNormals::normal(unsigned offset) const {
+  std::array<Floats, 3> normals;
+  findUnitGradients(around_.at(offset), per_pitch_, normals);
+  return {normals[0][0], normals[1][0], normals[2][0]};
 }
 
 openvdb::Vec3SGrid::Ptr makeNormalGrid(const openvdb::math::Transform& transform) {
@@ -92,15 +140,13 @@ openvdb::Vec3SGrid::Ptr outwardNormals(const openvdb::FloatGrid& surface,
       auto made = std::make_unique<NormalLeaf>(leaf.origin(), Vec3s(0.0F));
       made->setValueMask(active);
       Vec3s* out = made->buffer().data();
-      for (unsigned offset = 0; offset < 512; offset += 8) {
-        const auto row = static_cast<std::uint8_t>(bits[offset / 64] >> (offset % 64));
-        if (row == 0) continue;
-        LeafNormals::Row normal;
-        normals.makeRow(offset, normal);
-        for (unsigned z = 0; z < 8; ++z) {
-          if ((row >> z) & 1U) out[offset + z] = {normal[0][z], normal[1][z], normal[2][z]};
-        }
-      }
+      std::array<LeafNormals::Row, 64> rows;
+      normals.makeRows(rowsOf(bits), rows.data());
+      forEachBit(bits, [&](unsigned offset) {
+        const LeafNormals::Row& normal = rows[offset / 8];
+        const unsigned z = offset % 8;
+        out[offset] = {normal[0][z], normal[1][z], normal[2][z]};
+      });
       return made;
     };
   });

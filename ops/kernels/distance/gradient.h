@@ -1,11 +1,13 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include <openvdb/openvdb.h>
 
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/leaf_surroundings.h"
+#include "vdbdither/model/instruction_set.h"
 #include "vdbdither/model/lattice.h"
 
 namespace vdbdither {
@@ -20,7 +22,8 @@ namespace vdbdither {
 class LeafNormals {
  public:
   /// `surface` holds distances in mm, < 0 inside. Layers outside `valid` count as inactive.
-  LeafNormals(const openvdb::FloatTree& surface, const openvdb::Vec3d& pitch_mm, ZRange valid);
+  LeafNormals(const openvdb::FloatTree& surface, const openvdb::Vec3d& pitch_mm, ZRange valid,
+              InstructionSet instructions = bestInstructionSet());
 
   /// Prepares for the `wanted` voxels of `leaf`, a leaf of `surface`.
   void visit(const FloatLeaf& leaf, const LeafBits& wanted) { around_.visit(leaf, wanted); }
@@ -30,16 +33,19 @@ class LeafNormals {
 
   /// By component, the normals of eight voxels.
   using Row = std::array<std::array<float, 8>, 3>;
-  /// Sets `row` to those from `offset` on: a row along z that holds a wanted voxel. Those of
-  /// inactive voxels are undefined.
-  void makeRow(unsigned offset, Row& row) const;
+  /// Sets those of `out` whose bit is set in `rows`, rows along z in the order of the leaf that
+  /// hold a wanted voxel. The normals of inactive voxels are undefined.
+  void makeRows(std::uint64_t rows, Row* out) const { make_rows_(*this, rows, out); }
 
   /// The distances that the normals are computed from.
   [[nodiscard]] const LeafSurroundings& around() const { return around_; }
 
  private:
+  struct Loops;
+
   LeafSurroundings around_;
   openvdb::Vec3f per_pitch_;  ///< 1 / pitch, 1/mm
+  void (*make_rows_)(const LeafNormals& leaf, std::uint64_t rows, Row* out);
 };
 
 /// Returns the normals of every active voxel of `surface` (leaves only) within `core`; zero

@@ -33,7 +33,7 @@ void diffuse(OpenLeaf& leaf, OpenSurroundings& around) {
     if (free) printed = voxel.tone > 0.5F + around.sum(ijk, voxel.depth);
     setBit(leaf.printed, offset, printed);
     voxel.setPrinted(printed, free);
-    around.set(ijk, voxel);
+    around.set(ijk, voxel.error);
   });
   leaf.decided = true;
 }

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <openvdb/openvdb.h>
@@ -23,55 +25,60 @@ class OpenSurroundings {
   /// Moves to `block` and reads the decided voxels in and around it.
   void visit(OpenLeaves::Block block, OpenLeaves::Finder& find);
 
-  /// Adds the decided voxel at `ijk`, which lies in the block, or replaces it.
-  void set(const openvdb::Coord& ijk, const OpenVoxel& voxel);
+  /// Adds the voxel at `ijk`, an open one of the block, now that it is decided.
+  void set(const openvdb::Coord& ijk, float error) {
+    const openvdb::Coord at = ijk - lowest_;
+    put(columnOf(at), static_cast<std::size_t>(at.z()), error);
+  }
 
   /// Returns Σ q·w over the voxels that are there, as seen from a voxel of the block. In each
   /// column of the kernel, every fourth voxel is added to the same partial sum, so that all
   /// instruction sets give the same bits.
-  [[nodiscard]] float sum(const openvdb::Coord& ijk, float depth);
+  [[nodiscard]] float sum(const openvdb::Coord& ijk, float depth) const {
+    const openvdb::Coord at = ijk - lowest_;
+    return sum_(*this, columnOf(at), static_cast<std::size_t>(at.z()), depth);
+  }
 
  private:
-  /// A column of the kernel, as seen from the column in its middle.
-  struct Seen {
-    int column;            ///< its index less that in the middle
-    std::uint32_t apart2;  ///< the index of its first |Δ|² in the kernel
-    int half;              ///< z of HeightKernel::Column
+  /// Columns along z that are looked at together: four beside each other along y.
+  struct Four {
+    std::array<std::uint64_t, 4> half;    ///< z of HeightKernel::Column
+    std::array<std::uint64_t, 4> window;  ///< the voxels of the column; none if it is idle
+    std::ptrdiff_t first;                 ///< the index of the first less that in the middle
   };
-  /// The columns around one column that hold voxels, and that one. They are read by groups of eight
-  /// voxels from the lowest within the kernel on. Eight columns are looked at at a time.
-  struct Near {
-    explicit Near(std::size_t columns);
-    std::size_t middle;                  ///< the column around which they are
-    std::size_t own = 0;                 ///< its place among them
-    int own_half = 0;                    ///< the half of that column
-    std::size_t count = 0;               ///< rounded up to eight
-    std::vector<std::uint64_t> present;  ///< bit z: the lowest voxel for a sum at z
-    std::vector<std::uint64_t> window;   ///< the voxels of a sum at 0
-    std::vector<std::ptrdiff_t> voxels;  ///< index of the depth and error of the lowest for 0
-    std::vector<std::uint32_t> apart2;
+  /// Where eight voxels of a column are read, from the lowest within the kernel on.
+  struct Eight {
+    std::ptrdiff_t apart2;  ///< the index of their first |Δ|² in the kernel
+    std::ptrdiff_t voxels;  ///< the index of their first depth and error less that in the middle
   };
   struct Loops;
 
-  void clear();
+  void addFours(std::span<const HeightKernel::Column> columns);
+  template <bool decided>
   void read(const OpenLeaf& leaf, const openvdb::Coord& from);
-  void lookAround(std::size_t column);
-  [[nodiscard]] std::size_t columnOf(int x, int y) const {
-    return static_cast<std::size_t>(x * edges_.y() + y);
+  void put(std::size_t column, std::size_t z, float error) {
+    present_[column] |= std::uint64_t{1} << z;
+    errors_[column * stride_ + z] = error;
+  }
+  [[nodiscard]] std::size_t columnOf(const openvdb::Coord& at) const {
+    return static_cast<std::size_t>(at.x() * edges_.y() + at.y());
   }
 
   const HeightKernel& kernel_;
   const BlockOrder& order_;
-  float (*sum_)(const OpenSurroundings& around, unsigned z, float depth);
-  openvdb::Coord reach_;
+  float (*sum_)(const OpenSurroundings& around, std::size_t column, std::size_t z, float depth);
+  openvdb::Coord halo_;  ///< the reach; along z in whole leaves
   openvdb::Coord edges_;
   openvdb::Coord lowest_;               ///< the voxel at the corner of what is held
   std::size_t stride_;                  ///< from column to column
   std::vector<std::uint64_t> present_;  ///< by column along z
   std::vector<float> depths_;
   std::vector<float> errors_;  ///< zero where no voxel is
-  std::vector<Seen> seen_;
-  Near near_;
+  bool flat_;                  ///< whether no column of the kernel is longer than two times eight
+  std::vector<Four> fours_;
+  std::size_t own_ = 0;        ///< the index of those with the column in the middle
+  std::vector<Eight> eights_;  ///< two, or eight, for each column
+  std::vector<const OpenLeaf*> leaves_;
 };
 
 }  // namespace vdbdither

@@ -2,7 +2,9 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <openvdb/openvdb.h>
@@ -39,12 +41,37 @@ struct OpenVoxel {
   }
 };
 
+/// Memory for the open voxels of many leaves.
+class OpenVoxelStore {
+ public:
+  /// Returns room for `count` voxels, 512 at most.
+  OpenVoxel* reserve(std::size_t count) {
+    if (left_ < count) {
+      chunks_.push_back(std::make_unique_for_overwrite<OpenVoxel[]>(chunk));
+      next_ = chunks_.back().get();
+      left_ = chunk;
+    }
+    return next_;
+  }
+  /// Keeps the first `count` of the voxels for which there is room.
+  std::span<OpenVoxel> keep(std::size_t count) {
+    left_ -= count;
+    return {std::exchange(next_, next_ + count), count};
+  }
+
+ private:
+  static constexpr std::size_t chunk = 8192;
+  std::vector<std::unique_ptr<OpenVoxel[]>> chunks_;
+  OpenVoxel* next_ = nullptr;
+  std::size_t left_ = 0;
+};
+
 /// The open voxels of a leaf, in the order of the leaf.
-struct OpenLeaf {
+struct alignas(64) OpenLeaf {
   const FloatLeaf* leaf = nullptr;
   openvdb::Coord origin;
   bool decided = false;
-  std::vector<OpenVoxel> voxels;
+  std::span<OpenVoxel> voxels;
   std::array<std::uint16_t, 8> first{};  ///< of the voxels at each x, as an index of `voxels`
   LeafBits open{};
   LeafBits free{};     ///< the open voxels that the guard allows to change
@@ -137,6 +164,7 @@ class OpenLeaves {
 
   void sortIntoBlocks(const BlockOrder& order);
 
+  tbb::enumerable_thread_specific<OpenVoxelStore> stores_;
   std::vector<OpenLeaf> leaves_;      ///< in the order of the tree
   std::vector<OpenLeaf*> in_blocks_;  ///< those with open voxels, by blocks
   std::vector<Block> blocks_;         ///< in the order of visits within each layer

@@ -14,6 +14,8 @@ using Floats = float __attribute__((vector_size(16)));
 /// Eight floats, for code that is compiled for AVX2. Such values are passed by reference only: how
 /// they are passed by value depends on the instruction set.
 using EightFloats = float __attribute__((vector_size(32)));
+/// Four doubles, in two registers of the baseline. They are passed by reference only, too.
+using Doubles = double __attribute__((vector_size(32)));
 /// The result of a comparison: all ones where it holds, else zero.
 using FloatBits = std::int32_t __attribute__((vector_size(16)));
 

@@ -103,6 +103,19 @@ inline std::size_t countOf(const LeafBits& bits) {
   return count;
 }
 
+/// The rows along z that hold a set bit, as bits in the order of the leaf.
+inline std::uint64_t rowsOf(const LeafBits& bits) {
+  std::uint64_t rows = 0;
+  for (unsigned x = 0; x < bits.size(); ++x) {
+    // The lowest bit of each byte that is not zero, and these bits together by a product.
+    std::uint64_t any = bits[x] | bits[x] >> 4;
+    any |= any >> 2;
+    any = (any | any >> 1) & everyRow(1);
+    rows |= (any * 0x0102040810204080U) >> 56 << (8 * x);
+  }
+  return rows;
+}
+
 /// Calls `visit(number)` for every set bit, in rising order.
 template <typename Visit>
 void forEachBit(std::uint64_t word, Visit visit) {

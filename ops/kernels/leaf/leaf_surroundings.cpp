@@ -95,6 +95,12 @@ void LeafSurroundings::visit(const FloatLeaf& leaf, const LeafBits& wanted) {
   };
   const Span span_x{std::countr_zero(planes_x) - halo,
                     static_cast<int>(std::bit_width(planes_x)) + halo};
+  // The layers, as bits: the leaves below and above matter only close to them.
+  std::uint64_t layers = rows | rows >> 32;
+  layers |= layers >> 16;
+  layers |= layers >> 8;
+  const bool has_below = (layers & 0x03) != 0;
+  const bool has_above = (layers & 0xc0) != 0;
   const Span span_y{std::countr_zero(rows) / 8 - halo,
                     (static_cast<int>(std::bit_width(rows)) + 7) / 8 + halo};
 
@@ -103,17 +109,18 @@ void LeafSurroundings::visit(const FloatLeaf& leaf, const LeafBits& wanted) {
     for (const int step_y : {-1, 0, 1}) {
       const Span of_y = span_y.within(step_y);
       if (of_x.begin >= of_x.end || of_y.begin >= of_y.end) continue;
-      const Block below = blockAt(origin.offsetBy(8 * step_x, 8 * step_y, -8));
-      const Block middle = blockAt(origin.offsetBy(8 * step_x, 8 * step_y, 0));
-      const Block above = blockAt(origin.offsetBy(8 * step_x, 8 * step_y, 8));
+      const Coord beside = origin.offsetBy(8 * step_x, 8 * step_y, 0);
+      const Block middle = blockAt(beside);
+      const Block below = has_below ? blockAt(beside.offsetBy(0, 0, -8)) : middle;
+      const Block above = has_above ? blockAt(beside.offsetBy(0, 0, 8)) : middle;
       for (int x = of_x.begin; x < of_x.end; ++x) {
         for (int y = of_y.begin; y < of_y.end; ++y) {
           float* row =
               &values_[static_cast<std::size_t>(indexOf(8 * step_x + x, 8 * step_y + y, 0))];
-          below.copyHalf(row - 4, x, y, 4);
+          if (has_below) below.copyHalf(row - 4, x, y, 4);
           middle.copyHalf(row, x, y, 0);
           middle.copyHalf(row + 4, x, y, 4);
-          above.copyHalf(row + 8, x, y, 0);
+          if (has_above) above.copyHalf(row + 8, x, y, 0);
         }
       }
     }

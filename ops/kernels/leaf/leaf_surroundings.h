@@ -25,13 +25,12 @@ class LeafSurroundings {
   LeafSurroundings(const openvdb::FloatTree& surface, ZRange valid)
       : surface_(surface), valid_(valid) {}
 
-  /// Reads the surroundings of `leaf`, a leaf of `surface`. Only the rows along z that hold one of
-  /// `wanted`, and the rows around them, are filled.
+  /// Reads what is around the `wanted` voxels of `leaf`, a leaf of `surface`.
   void visit(const FloatLeaf& leaf, const LeafBits& wanted);
 
-  /// Returns where the distance of the voxel at `offset` in the leaf lies, which must be in a
-  /// wanted row. Those of its neighbours, up to `halo` away along each axis, lie at multiples of
-  /// the strides.
+  /// Returns where the distance of the voxel at `offset` in the leaf lies. Those of its neighbours,
+  /// up to `halo` away along each axis, lie at multiples of the strides; they are defined if the
+  /// voxel is wanted.
   [[nodiscard]] const float* at(unsigned offset) const {
     const auto n = static_cast<int>(offset);
     return &values_[static_cast<std::size_t>(indexOf(n / 64, n / 8 % 8, n % 8))];

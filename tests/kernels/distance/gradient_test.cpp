@@ -41,6 +41,30 @@ TEST(OutwardNormals, PointAwayFromTheCentreOfASphere) {
   }
 }
 
+TEST(LeafNormals, OfEveryInstructionSetAreThoseOfSingleVoxels) {
+  const Vec3d pitch_mm(0.042, 0.084, 0.022);
+  const Lattice lattice = test::latticeAround(pitch_mm, Vec3d(0.5), 0.1);
+  const auto surface = test::sampled(test::sphere(Vec3d(0.01), 0.4), lattice, 0.08);
+  const ZRange layers = lattice.layers();
+  for (const InstructionSet instructions : {bestInstructionSet(), InstructionSet::baseline}) {
+    LeafNormals normals(surface->tree(), pitch_mm, layers, instructions);
+    int compared = 0;
+    for (auto leaf = surface->tree().cbeginLeaf(); leaf; ++leaf) {
+      const LeafBits active = activeBits(*leaf, 0xff);
+      normals.visit(*leaf, active);
+      std::array<LeafNormals::Row, 64> rows;
+      normals.makeRows(rowsOf(active), rows.data());
+      forEachBit(active, [&](unsigned offset) {
+        const LeafNormals::Row& row = rows[offset / 8];
+        const unsigned z = offset % 8;
+        ASSERT_EQ(normals.normal(offset), Vec3s(row[0][z], row[1][z], row[2][z])) << offset;
+        ++compared;
+      });
+    }
+    EXPECT_GT(compared, 1000);
+  }
+}
+
 /// Distances 1 mm apart along x, the middle one at the origin.
 openvdb::FloatGrid::Ptr threeAlongX(float below, float above) {
   auto grid = openvdb::FloatGrid::create(9.0F);

@@ -103,8 +103,8 @@ void compareWithReference(const Setting& setting) {
             compared += std::abs(reference) > 0.1;
           }
           if (leaf->decided) return;
-          best.set(ijk, voxel);
-          baseline.set(ijk, voxel);
+          best.set(ijk, voxel.error);
+          baseline.set(ijk, voxel.error);
           voxels[ijk] = voxel;
         });
       }

@@ -60,7 +60,7 @@ TEST(LeafSurroundings, AreWhatTheTreeHoldsUpToTwoVoxelsAway) {
       const LeafBits wanted = someRows(leaves);
       around.visit(*leaf, wanted);
       for (unsigned offset = 0; offset < 512; ++offset) {
-        if ((wanted[offset / 64] >> (offset % 64 / 8 * 8) & 0xffU) == 0) continue;
+        if ((wanted[offset / 64] >> (offset % 64) & 1U) == 0) continue;
         const float* at = around.at(offset);
         for (int i = -LeafSurroundings::halo; i <= LeafSurroundings::halo; ++i) {
           for (int j = -LeafSurroundings::halo; j <= LeafSurroundings::halo; ++j) {
