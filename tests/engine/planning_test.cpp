@@ -91,6 +91,13 @@ TEST(Planning, SlabsAreAsTallAsMemoryAllows) {
   EXPECT_EQ(planOf(line + " --slab all").slab_layers, 904);
 }
 
+TEST(Planning, TallSlabsAreForJobsOfLittleMemory) {
+  std::string joins;
+  for (int i = 0; i < 100; ++i) joins += " ! join --top 40 --pipe";  // of 6 MB each
+  EXPECT_EQ(planOf("numbers --top 900" + joins + " ! keep --explain --memory 4GiB").slab_layers,
+            64);
+}
+
 TEST(Planning, TimeIsKnownIfThatOfEveryStageIs) {
   const JobPlan plan = planOf("numbers --top 16 ! keep --threads 1");
   EXPECT_DOUBLE_EQ(*plan.stages[0].cpu_seconds, 16);

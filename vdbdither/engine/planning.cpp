@@ -13,7 +13,11 @@ namespace {
 
 using Kind = StagePlan::Kind;
 
+/// Taller slabs have fewer seams, where layers are copied and worked on twice. They are chosen only
+/// for jobs that take little memory.
+constexpr int usual_auto_slab = 64;
 constexpr int tallest_auto_slab = 128;
+constexpr double tall_slab_bytes = 512.0 * (1 << 20);
 
 /// `text` is A:B, counted from the first of `all`, or empty for all of them.
 ZRange parseLayers(const std::string& text, ZRange all) {
@@ -88,9 +92,12 @@ void planSlabs(JobPlan& plan, const RunOptions& options) {
     plan.slab_layers = alignedToLeaves(plan.stages.front().cores).size();
   } else if (options.slab == "auto") {
     plan.slab_layers = tallest_auto_slab;
-    while (plan.slab_layers > leaf_layers &&
-           memoryBytes(plan, plan.slab_layers) > plan.memory_limit_bytes)
-      plan.slab_layers /= 2;
+    const auto fits = [&](int layers) {
+      const double limit = plan.memory_limit_bytes;
+      return memoryBytes(plan, layers) <=
+             (layers > usual_auto_slab ? std::min(limit, tall_slab_bytes) : limit);
+    };
+    while (plan.slab_layers > leaf_layers && !fits(plan.slab_layers)) plan.slab_layers /= 2;
   } else {
     plan.slab_layers = std::stoi(options.slab);
   }

@@ -63,8 +63,8 @@ void RunOptions::declare(Options& options) {
   options.parsed(
       "slab", "N", [this](const std::string& text) { slab = checkedSlab(text); },
       [this] { return slab; }, "Number of layers worked on at a time, a multiple of 8");
-  options.words(
-      {{"auto", "As many as the memory allows, up to 128"}, {"all", "All layers at once"}});
+  options.words({{"auto", "As many as the memory allows, up to 64, or 128 within 512MiB"},
+                 {"all", "All layers at once"}});
   options.parsed(
       "memory", "SIZE",
       [this](const std::string& text) {
