@@ -99,8 +99,9 @@ void LeafSurroundings::visit(const FloatLeaf& leaf, const LeafBits& wanted) {
   std::uint64_t layers = rows | rows >> 32;
   layers |= layers >> 16;
   layers |= layers >> 8;
-  const bool has_below = (layers & 0x03) != 0;
-  const bool has_above = (layers & 0xc0) != 0;
+  constexpr unsigned lowest = (1U << halo) - 1;
+  const bool has_below = (layers & lowest) != 0;
+  const bool has_above = (layers & lowest << (8 - halo)) != 0;
   const Span span_y{std::countr_zero(rows) / 8 - halo,
                     (static_cast<int>(std::bit_width(rows)) + 7) / 8 + halo};
 
