@@ -86,7 +86,7 @@ class Halftones(ProgramTest):
     def test_what_is_no_coverage_is_refused_in_a_line(self):
         meshes.write_stl(self.folder / "box.stl", meshes.box((1, 1, 1)))
         self.succeed("mesh2sdf", "box.stl", "--pitch", "0.05mm,0.05mm,0.05mm", "!", "dither", "--mask", "none", "-o", "solid.vdb")
-        for value, message in ((-1, "coverages must be numbers from 0 to 1"), (0, "the coverages are all 0 at voxel [0, 0, 0]")):
+        for value, message in ((-1, "coverages must be finite and not negative"), (0, "the coverages are all 0 at voxel [0, 0, 0]")):
             density = pyopenvdb.FloatGrid()
             density.name = "density"
             density.transform = pyopenvdb.createLinearTransform(0.05)

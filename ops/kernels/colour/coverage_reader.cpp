@@ -213,7 +213,7 @@ class GridReader : public CoverageReader {
                            unsigned offset) const {
     std::ostringstream text;
     text << "grid '" << name << "' " << what << " at voxel " << at(offset)
-         << "; coverages must be numbers from 0 to 1";
+         << "; coverages must be finite and not negative";
     throw DataError(text.str());
   }
 

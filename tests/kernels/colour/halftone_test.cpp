@@ -185,7 +185,7 @@ TEST(GridCoverages, RefusesWhatIsNoCoverage) {
     reader->read(openvdb::FloatTree::LeafNodeType::coordToOffset(Coord(1, 2, 0)), 1U << 3,
                  coverages);
   };
-  const std::string advice = " at voxel [1, 2, 3]; coverages must be numbers from 0 to 1";
+  const std::string advice = " at voxel [1, 2, 3]; coverages must be finite and not negative";
   EXPECT_THAT([&] { refusal(-0.5F); }, ThrowsMessage<DataError>("grid 'ink' is -0.5" + advice));
   EXPECT_THAT([&] { refusal(std::nanf("")); },
               ThrowsMessage<DataError>("grid 'ink' is nan" + advice));
