@@ -113,6 +113,8 @@ void planOutputs(JobPlan& plan, const RunOptions& options) {
     if (output.path.empty() || output.path == "-") continue;
     const int all = stage.schema.lattice.layers().size();
     if (all > 0) output.bytes *= static_cast<double>(plan.layers.size()) / all;
+    std::error_code none;
+    stage.output_exists = std::filesystem::exists(output.path, none);
     stage.free_disk_bytes = freeDiskBytes(output.path);
     if (output.bytes > stage.free_disk_bytes && !options.explain) {
       throw DataError(stage.name + ": '" + output.path + "' needs about " +
