@@ -44,7 +44,7 @@ class Compensate : public Filter {
                        std::to_string(most_reach) + " voxels; give a smaller spread");
     checkBand(*surface, in.lattice);
     compensation_ = DetailCompensation{in.lattice, *spread_mm_, steps_};
-    Schema out = withoutSurfaceExtras(in);
+    Schema out = withoutOutdated(in, surface_grid);
     out.grids[surface_grid] = surface->copyGridWithNewTree();
     return out;
   }

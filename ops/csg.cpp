@@ -61,7 +61,7 @@ class CsgOperator : public Filter {
       throw DataError("'" + path + "': " + error.what());
     }
 
-    Schema out = withoutSurfaceExtras(in);
+    Schema out = withoutOutdated(in, surface_grid);
     out.grids[surface_grid] = emptyCombined(*surface, *empty_);
     out.footprint = in.footprint + second.footprint;
     if (operation_ == Csg::unite) {

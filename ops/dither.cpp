@@ -150,7 +150,7 @@ class Dither : public Filter {
                   "--amplitude " + shortestText(dither_.amplitude));
     }
 
-    Schema out = in;
+    Schema out = withoutOutdated(in, solid_grid);
     out.grids[solid_grid] = makeSolidGrid(surface->transform());
     if (displaced_) out.grids[displaced_grid] = makeDisplacedGrid(*surface);
     return out;

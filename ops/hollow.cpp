@@ -41,7 +41,7 @@ class Hollow : public Filter {
     drains_.clear();
     for (const std::string& text : drains_given_) drains_.push_back(drainFrom(text));
 
-    Schema out = withoutSurfaceExtras(in);
+    Schema out = withoutOutdated(in, surface_grid);
     // The band outside has served: what the box was larger for it would be empty layers.
     if (statesHeldBand(*surface)) {
       for (int axis = 0; axis < 3; ++axis) {

@@ -26,7 +26,7 @@ class Interlace : public Filter {
     const auto surface = findGrid<FloatGrid>(in.grids, surface_grid);
     const openvdb::Vec3d& origin_mm = in.lattice.origin_mm;
     refined_ = origin_mm != openvdb::Vec3d(0.0);
-    Schema out = in;
+    Schema out = withoutOutdated(in, solid_grid);
     if (refined_) {
       if (origin_mm.x() != 0 || origin_mm.z() != 0 ||
           !nearlyEqual(origin_mm.y(), -in.lattice.pitch_mm.y() / 2)) {

@@ -89,9 +89,14 @@ class MaskSpectrum : public Sink {
   void finish() override {
     if (!metadata_) throw DataError("no layer of a mask came");
     const std::string text = jsonText(spectra(), 1) + "\n";
-    StagedOutput output(file_, StagedOutput::Kind::file);
-    writeFile(output.path(), textBytes(text), file_);
-    output.commit();
+    output_.emplace(file_, StagedOutput::Kind::file);
+    writeFile(output_->path(), textBytes(text), file_);
+    output_->complete();
+  }
+
+  void publish() override {
+    output_->commit();
+    output_.reset();
   }
 
  private:
@@ -173,6 +178,7 @@ class MaskSpectrum : public Sink {
   openvdb::CoordBBox box_;
   openvdb::MetaMap::Ptr metadata_;
   std::vector<float> values_;
+  std::optional<StagedOutput> output_;
 };
 
 }  // namespace

@@ -197,13 +197,13 @@ class SurfaceMeasurement {
                 .seconds = 1e-6 * cost::measure_us_per_triangle * triangles};
   }
 
-  /// Measures `mesh` and gives the figures out.
+  /// Measures `mesh`, gives the figures out and completes the files.
   ///
   /// \param of          the name of the surface in the report
   /// \param lattice     of the voxels that the surface was made from, or null
   /// \param components  their components, or null
   void finish(Mesh mesh, const std::string& of, const Lattice* lattice, VoxelComponents* components,
-              Reporter& reporter) const {
+              Reporter& reporter) {
     const auto progress = [&](double fraction) { reporter.progress(fraction); };
     if (smooths()) smooth(mesh, {.iterations = smoothing_.iterations}, progress);
     const SurfaceErrors errors = surfaceErrors(mesh, *reference_, spacing_mm_, progress);
@@ -211,20 +211,26 @@ class SurfaceMeasurement {
     for (const char* name :
          {"bias_mm", "mean_mm", "rms_mm", "p50_mm", "p90_mm", "p95_mm", "p99_mm", "max_mm"})
       reporter.count(name, all["area"][name].get<double>());
-    // Both files appear, or none.
-    std::optional<StagedOutput> staged;
     if (!report_file_.empty()) {
       const std::string text = jsonText(all, 1) + "\n";
-      staged.emplace(report_file_, StagedOutput::Kind::file);
-      writeFile(staged->path(), textBytes(text), report_file_);
+      report_.emplace(report_file_, StagedOutput::Kind::file);
+      writeFile(report_->path(), textBytes(text), report_file_);
+      report_->complete();
     }
     if (!map_file_.empty()) writeMap(mesh, errors, all["map_range_mm"].get<double>());
-    if (staged) staged->commit();
     if (json_.json) {
       reporter.print(jsonText(all, 1) + "\n");
     } else if (report_file_.empty()) {
       reporter.print(plainText(all));
     }
+  }
+
+  /// Gives the files that `finish` completed their names.
+  void publish() {
+    if (map_) map_->commit();
+    if (report_) report_->commit();
+    map_.reset();
+    report_.reset();
   }
 
  private:
@@ -282,11 +288,11 @@ class SurfaceMeasurement {
     return all;
   }
 
-  void writeMap(const Mesh& mesh, const SurfaceErrors& errors, double range_mm) const {
+  void writeMap(const Mesh& mesh, const SurfaceErrors& errors, double range_mm) {
     VertexExtras extras{true, true,
                         "quality is the error in mm; blue is -" + shortestText(range_mm) +
                             ", grey 0, red " + shortestText(range_mm)};
-    MeshWriter writer(map_file_, extras);
+    map_.emplace(map_file_, extras);
     std::vector<std::array<std::uint8_t, 3>> colours;
     std::vector<float> qualities;
     for (std::size_t vertex = 0; vertex < errors.vertices; ++vertex) {
@@ -294,8 +300,8 @@ class SurfaceMeasurement {
       colours.push_back(divergingColour(range_mm > 0 ? error / range_mm : 0));
       qualities.push_back(static_cast<float>(error));
     }
-    writer.add(mesh.vertices, mesh.triangles, 0, colours, qualities);
-    writer.commit();
+    map_->add(mesh.vertices, mesh.triangles, 0, colours, qualities);
+    map_->complete();
   }
 
   std::string reference_file_;
@@ -312,6 +318,8 @@ class SurfaceMeasurement {
 
   std::optional<ClosestPoints> reference_;
   double reference_volume_mm3_ = 0;  ///< where shells overlap counted once
+  std::optional<StagedOutput> report_;
+  std::optional<MeshWriter> map_;
 };
 
 /// The surface of a grid.
@@ -350,6 +358,8 @@ class Measure : public Sink {
     measurement_.finish(std::move(mesh_), "grid " + name_, &lattice_, &*components_, report());
   }
 
+  void publish() override { measurement_.publish(); }
+
  private:
   SurfaceMeasurement measurement_;
   std::string name_;
@@ -375,6 +385,7 @@ class MeasureMesh : public Tool {
     Mesh mesh = readMesh(file_, [this](const std::string& text) { report().warn(text); });
     if (measurement_.smooths()) checkClosed(mesh);
     measurement_.finish(std::move(mesh), file_, nullptr, nullptr, report());
+    measurement_.publish();
   }
 
  private:

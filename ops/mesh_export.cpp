@@ -88,6 +88,10 @@ class MeshExport : public Sink {
       throw DataError("grid '" + name_ + "' has no surface: nothing of it is inside");
     report().count("vertices", static_cast<double>(writer_->vertices()));
     report().count("triangles", static_cast<double>(writer_->triangles()));
+    writer_->complete();
+  }
+
+  void publish() override {
     writer_->commit();
     writer_.reset();
   }

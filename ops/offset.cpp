@@ -71,7 +71,7 @@ class Offset : public Filter {
     if (!grid_.empty()) findGrid<FloatGrid>(in.grids, grid_);
     checkBand();
 
-    Schema out = withoutSurfaceExtras(in);
+    Schema out = withoutOutdated(in, surface_grid);
     out.grids[surface_grid] = emptySurface(*surface, offset_.backgroundMm());
     return out;
   }

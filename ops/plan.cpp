@@ -18,6 +18,7 @@
 #include "vdbdither/engine/tool_watcher.h"
 #include "vdbdither/engine/version.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/printable.h"
 
 namespace vdbdither {
 
@@ -70,6 +71,7 @@ class Plan : public Tool {
     const JobPlan& whole = pipeline.plan(watcher);
     checkPlan(whole);
     Job job = jobOf(words, whole, options);
+    checkNames(job);
     cut(job, whole, options);
     write(job);
     tell(job);
@@ -148,6 +150,20 @@ class Plan : public Tool {
     }
     job.inputs = inputsRead(job.outputs);
     return job;
+  }
+
+  /// job.json is JSON, which holds no other bytes than those of UTF-8.
+  static void checkNames(const Job& job) {
+    std::vector<std::string> names{job.folder};
+    names.insert(names.end(), job.chain.begin(), job.chain.end());
+    names.insert(names.end(), job.outputs.begin(), job.outputs.end());
+    for (const JobInput& input : job.inputs) names.push_back(input.file);
+    for (const std::string& name : names) {
+      if (validUtf8(name) != name) {
+        throw UsageError("'" + name +
+                         "' is not UTF-8, and a job keeps names as UTF-8; rename the file");
+      }
+    }
   }
 
   /// Divides the layers evenly, at cuts between leaves, into at most `count` pieces.

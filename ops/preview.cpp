@@ -63,6 +63,7 @@ class Preview : public Tool {
         page.add(z, std::move(slices[static_cast<std::size_t>(z - begin)]));
     }
     page.finish(target);
+    page.commit();
     if (const std::string text = page.warning(); !text.empty()) warn(text);
   }
 

@@ -44,7 +44,7 @@ class Refine : public Filter {
     const Vec3d& pitch_mm = in.lattice.pitch_mm;
     checkBand(surface->background(), pitch_mm.length());
     refinement_.emplace(pitch_mm, *spread_mm_, guard_ == Guard::walls, sweeps_);
-    Schema out = in;
+    Schema out = withoutOutdated(in, solid_grid);
     out.grids[solid_grid] = makeSolidGrid(surface->transform());
     return out;
   }

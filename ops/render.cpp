@@ -107,6 +107,7 @@ class SurfacePicture {
                 .seconds = 1e-6 * cost::render_us_per_ray * *pixels * samples_};
   }
 
+  /// Draws the picture and completes its file.
   void finish(Mesh mesh, const SurfaceTint& tint, Reporter& reporter) {
     if (frame_file_.empty()) fit(camera_, mesh, margin_);
     reporter.count("triangles", static_cast<double>(mesh.triangles.size()));
@@ -120,9 +121,15 @@ class SurfacePicture {
     const double brightness = brightness_.value_or(brightnessOf(look_));
     const std::vector<std::uint8_t> bytes =
         file_.ends_with(".exr") ? exrOf(picture, brightness) : pngOf(picture, brightness);
-    StagedOutput staged(file_, StagedOutput::Kind::file);
-    writeFile(staged.path(), bytes, file_);
-    staged.commit();
+    output_.emplace(file_, StagedOutput::Kind::file);
+    writeFile(output_->path(), bytes, file_);
+    output_->complete();
+  }
+
+  /// Gives the file that `finish` completed its name.
+  void publish() {
+    output_->commit();
+    output_.reset();
   }
 
  private:
@@ -191,6 +198,7 @@ class SurfacePicture {
   int samples_ = 64;
   int seed_ = 0;
   std::optional<double> brightness_;
+  std::optional<StagedOutput> output_;
   OverwriteOption overwrite_;
 };
 
@@ -240,6 +248,8 @@ class Render : public Sink {
       tint = [this](std::uint32_t triangle, const openvdb::Vec3d&) { return tints_[triangle]; };
     picture_.finish(std::move(mesh_), tint, report());
   }
+
+  void publish() override { picture_.publish(); }
 
  private:
   /// Adds triangles, which have the colour of the voxel nearest to their middle; white where there
@@ -294,6 +304,7 @@ class RenderMesh : public Tool {
       };
     }
     picture_.finish(std::move(mesh), tint, report());
+    picture_.publish();
   }
 
  private:

@@ -169,11 +169,9 @@ class SliceExport : public Sink {
     if (spool_) writeKept();
     if (!writer_) throw DataError("no layer came to slice");
     stack_ = writer_->finish();
-    writer_.reset();
     if (page_) {
       page_->finish(page_name_);
       if (const std::string text = page_->warning(); !text.empty()) report().warn(text);
-      page_.reset();
     }
     // Some layers of a job may well be empty.
     const std::vector<std::uint64_t>& voxels = stack_.voxels;
@@ -184,6 +182,13 @@ class SliceExport : public Sink {
     for (std::size_t i = 0; i < voxels.size(); ++i) {
       report().count("voxels of " + stack_.materials[i].name, static_cast<double>(voxels[i]));
     }
+  }
+
+  void publish() override {
+    writer_->commit();
+    writer_.reset();
+    if (page_) page_->commit();
+    page_.reset();
   }
 
  private:

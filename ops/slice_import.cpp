@@ -163,11 +163,16 @@ class StackLayers : public Input {
     if (whole.begin > all.begin) whole.begin = alignedToLeaves({whole.begin - 1, whole.begin}).end;
     if (whole.end < all.end) whole.end = alignedToLeaves({whole.end, whole.end + 1}).begin;
     const int missing = core.begin < stored.begin ? core.begin : stored.end;
-    throw DataError("'" + path_ + "' lacks layer " + std::to_string(missing - all.begin) +
-                    (whole.empty() ? make_stack_again
-                                   : "; --layers " + std::to_string(whole.begin - all.begin) + ":" +
-                                         std::to_string(whole.end - all.begin) +
-                                         " takes what it has in whole groups of eight"));
+    const ZRange groups = intersection(alignedToLeaves(stored), all);
+    const auto text = [&](int z) { return std::to_string(z - all.begin); };
+    throw DataError("'" + path_ + "' lacks layer " + text(missing) + "; " +
+                    (whole.empty()
+                         ? "a stack is read in whole groups of eight layers, and it has " +
+                               text(stored.begin) + ":" + text(stored.end) +
+                               "; export such groups: slice-export --layers " + text(groups.begin) +
+                               ":" + text(groups.end)
+                         : "--layers " + text(whole.begin) + ":" + text(whole.end) +
+                               " takes what it has in whole groups of eight"));
   }
 
   std::string path_;

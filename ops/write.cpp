@@ -126,7 +126,6 @@ class WriteOperator : public Sink {
   void finish() override {
     if (frames_) {
       beginFrames();
-      frames_->end();
       return;
     }
     Grids grids;
@@ -142,8 +141,14 @@ class WriteOperator : public Sink {
       writeVdb(*piece_ / piece_name, contents, codec_, *piece_ / piece_name, half_);
     } else {
       writeVdb(output_->path(), contents, codec_, path_, half_);
-      output_->commit();
+      output_->complete();
     }
+  }
+
+  void publish() override {
+    if (frames_) frames_->end();
+    if (output_) output_->commit();
+    output_.reset();
   }
 
  private:

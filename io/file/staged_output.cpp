@@ -147,6 +147,7 @@ class Written {
 };
 
 std::atomic<bool> flushes = true;
+std::atomic<bool> accepts_existing = false;
 
 bool isMountPoint(const fs::path& path) {
   struct statx status {};
@@ -305,7 +306,7 @@ void StagedOutput::check(const fs::path& given, Kind kind, bool overwrite) {
       (kind == Kind::folder && ::access(target.c_str(), R_OK | W_OK | X_OK) != 0))
     fail("replace", given, errno);
   if (kind == Kind::folder && fs::is_empty(target, ignored)) return;
-  if (!overwrite) throw UsageError(name + " exists; --overwrite replaces it");
+  if (!overwrite && !accepts_existing) throw UsageError(name + " exists; --overwrite replaces it");
 }
 
 void StagedOutput::putBack(const fs::path& target,
@@ -322,7 +323,7 @@ void StagedOutput::checkFolder(const fs::path& given, bool overwrite, const OwnF
   const fs::path target = destination(given);
   check(given, Kind::folder, overwrite);
   std::error_code none;
-  if (!isThere(target) || fs::is_empty(target, none)) return;
+  if (!overwrite || !isThere(target) || fs::is_empty(target, none)) return;
   const ReadsUnnoted of_old_output;
   const fs::path foreign = foreignIn(target, own(target));
   if (!foreign.empty()) {
@@ -361,6 +362,8 @@ StagedOutput::~StagedOutput() {
 }
 
 void StagedOutput::leaveFlushOut() { flushes = false; }
+
+void StagedOutput::acceptExisting() { accepts_existing = true; }
 
 void StagedOutput::abandonAll(std::chrono::milliseconds patience) {
   // Never unlocked. A write to a network disk that does not answer may hold it: then go on without.
@@ -408,13 +411,19 @@ void StagedOutput::write(const std::string& name, std::span<const std::uint8_t> 
              shown_ / name);
 }
 
-void StagedOutput::commit() {
+void StagedOutput::complete() {
   throwIfInterrupted();
   const std::shared_lock naming(Written::all().naming);
   // Before the output has its name: a machine that loses power must not leave an empty one. One
   // call for a whole folder, whose files one by one take some 8 ms each.
   if (const int error = flushed(partial_, kind_ == Kind::folder ? ::syncfs : ::fsync))
     fail("write", shown_, error);
+  completed_ = true;
+}
+
+void StagedOutput::commit() {
+  if (!completed_) complete();
+  const std::shared_lock naming(Written::all().naming);
   Written::all().forgetPartial(target_);
   if (kind_ == Kind::folder) {
     commitFolder();

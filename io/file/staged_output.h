@@ -55,17 +55,25 @@ class StagedOutput {
   /// lie on one file system that can. Throws DataError as `write` does.
   void link(const std::string& name, const std::filesystem::path& from) const;
 
-  /// Gives it its name, in place of what had it before, once it is on the disk: at every moment the
+  /// Waits until all that was written is on the disk. Where a run has several outputs, all are
+  /// complete before the first is committed. Throws DataError, and Interrupted if the run is to
+  /// stop.
+  void complete();
+
+  /// Gives it its name, in place of what had it before, once it is complete: at every moment the
   /// old one or the new one is there, whole, also if the machine stops. (Where the file system
   /// cannot exchange folders, a run that is killed in this moment leaves the old one for
   /// `putBack`.) Files that somebody else put into the old folder since `checkFolder` stay in the
   /// folder. Throws DataError; an output that could not take the place of what is there is then
-  /// kept under its name with `.new`. Throws Interrupted if the run is to stop.
+  /// kept under its name with `.new`. Throws what `complete` throws unless that was called.
   void commit();
 
-  /// Does not wait for the disk in `commit` from now on: a machine that stops may lose outputs that
-  /// have their names.
+  /// Does not wait for the disk in `complete` and `commit` from now on: a machine that stops may
+  /// lose outputs that have their names.
   static void leaveFlushOut();
+
+  /// Lets `check` accept what exists from now on, for a process that writes no output.
+  static void acceptExisting();
 
   /// Removes all outputs of the process that are not committed, and lets none be committed or
   /// written to any more: threads that try stay where they are. For a process that ends without
@@ -89,6 +97,7 @@ class StagedOutput {
   std::filesystem::path partial_;
   Kind kind_;
   OwnFiles own_;
+  bool completed_ = false;
   bool committed_ = false;
 };
 

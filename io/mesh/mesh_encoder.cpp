@@ -7,10 +7,10 @@ namespace fs = std::filesystem;
 MeshEncoder::MeshEncoder(const fs::path& path)
     : staged_(path, StagedOutput::Kind::file), file_(staged_.path(), path) {}
 
-void MeshEncoder::commit(std::uint64_t vertices, std::uint64_t triangles) {
+void MeshEncoder::complete(std::uint64_t vertices, std::uint64_t triangles) {
   finish(vertices, triangles);
   file_.close();
-  staged_.commit();
+  staged_.complete();
 }
 
 IndexedMeshEncoder::IndexedMeshEncoder(const fs::path& path)

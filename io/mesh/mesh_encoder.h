@@ -27,7 +27,7 @@ struct MeshVertex {
 };
 
 /// Writes a mesh in one format as its vertices and triangles come. The file appears under its name
-/// when it is complete. Every function throws DataError where the file cannot be written.
+/// when it is committed. Every function throws DataError where the file cannot be written.
 class MeshEncoder {
  public:
   explicit MeshEncoder(const std::filesystem::path& path);
@@ -39,9 +39,11 @@ class MeshEncoder {
   /// Says that no later triangle has a vertex before this one.
   virtual void forgetBefore(std::uint32_t /*vertex*/) {}
 
-  /// Completes the file and gives it its name.
+  /// Completes the file.
   /// @param vertices, triangles  how many came
-  void commit(std::uint64_t vertices, std::uint64_t triangles);
+  void complete(std::uint64_t vertices, std::uint64_t triangles);
+  /// Gives the complete file its name.
+  void commit() { staged_.commit(); }
 
  protected:
   /// Writes what can be written only at the end.

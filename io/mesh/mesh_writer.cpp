@@ -50,6 +50,14 @@ void MeshWriter::add(std::span<const openvdb::Vec3d> vertices,
   encoder_->forgetBefore(open_from);
 }
 
-void MeshWriter::commit() { encoder_->commit(vertices_, triangles_); }
+void MeshWriter::complete() {
+  encoder_->complete(vertices_, triangles_);
+  completed_ = true;
+}
+
+void MeshWriter::commit() {
+  if (!completed_) complete();
+  encoder_->commit();
+}
 
 }  // namespace vdbdither

@@ -15,7 +15,7 @@ namespace vdbdither {
 
 /// A mesh on its way into a file of one of the `meshFormats`, by the ending of its name. It comes
 /// in pieces, and only what later pieces still need is kept in memory. Coordinates are floats. The
-/// file appears when it is complete.
+/// file appears when it is committed.
 class MeshWriter {
  public:
   /// Checks that `path` names a mesh file that can be written. Throws UsageError.
@@ -34,7 +34,9 @@ class MeshWriter {
            std::uint32_t open_from, std::span<const std::array<std::uint8_t, 3>> colours = {},
            std::span<const float> qualities = {});
 
-  /// Completes the file and gives it its name.
+  /// Completes the file. Throws DataError.
+  void complete();
+  /// Gives the file its name, once it is complete. Throws DataError.
   void commit();
 
   [[nodiscard]] std::uint64_t vertices() const { return vertices_; }
@@ -45,6 +47,7 @@ class MeshWriter {
   std::unique_ptr<MeshEncoder> encoder_;
   std::uint64_t vertices_ = 0;
   std::uint64_t triangles_ = 0;
+  bool completed_ = false;
 };
 
 }  // namespace vdbdither

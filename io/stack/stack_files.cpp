@@ -83,9 +83,9 @@ void StackOutput::copy(const std::string& name, const fs::path& from) {
   }
 }
 
-void StackOutput::commit() {
+void StackOutput::complete() {
   if (zip_) zip_->finish();
-  staged_.commit();
+  staged_.complete();
 }
 
 StackInput::StackInput(const fs::path& path) : place_(path), manifest_name_(manifest_name) {

@@ -28,7 +28,7 @@ inline constexpr const char* archive_ending = ".zip";
 bool namesArchive(const std::filesystem::path& path);
 
 /// The files of a stack of slices on their way to disk: a folder, or an archive where the name says
-/// so. It exists under its name only once it is complete.
+/// so. It exists under its name only once it is committed.
 class StackOutput {
  public:
   /// Checks that `target` can be written. An existing folder must be a stack and hold nothing else
@@ -42,7 +42,10 @@ class StackOutput {
   void write(const std::string& name, std::span<const std::uint8_t> bytes);
   /// Writes a file whose bytes are those of the file `from`. Throws DataError.
   void copy(const std::string& name, const std::filesystem::path& from);
-  void commit();
+  /// Completes the stack, to which nothing is written any more. Throws DataError.
+  void complete();
+  /// Gives the complete stack its name. Throws DataError.
+  void commit() { staged_.commit(); }
 
  private:
   std::filesystem::path shown_;

@@ -327,9 +327,9 @@ void StackPage::finish(const std::filesystem::path& target) {
   appendData(page, "volume", deflated(pieces));
   page += "<script type=\"application/json\" id=\"stack\">" + description() + "</script>\n";
   page += viewer_page.substr(mark + data_mark.size());
-  StagedOutput staged(target, StagedOutput::Kind::file);
-  writeFile(staged.path(), textBytes(page), target);
-  staged.commit();
+  output_.emplace(target, StagedOutput::Kind::file);
+  writeFile(output_->path(), textBytes(page), target);
+  output_->complete();
 }
 
 }  // namespace vdbdither

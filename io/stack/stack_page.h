@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "io/file/staged_output.h"
 #include "io/stack/coarse_volume.h"
 #include "io/stack/manifest.h"
 #include "io/stack/slice_group.h"
@@ -45,8 +46,10 @@ class StackPage {
   /// @param images  of each stack, in its own layout, with the index of the material of each voxel
   void add(int z, std::vector<SpanImage> images);
 
-  /// Writes the page. It exists under its name once it is complete. Throws DataError.
+  /// Writes the page. It exists under its name once it is committed. Throws DataError.
   void finish(const std::filesystem::path& target);
+  /// Gives the page that `finish` wrote its name. Throws DataError.
+  void commit() { output_->commit(); }
 
   /// Of how many slices one is shown. Asked after `finish`.
   [[nodiscard]] int stride() const { return stride_; }
@@ -85,6 +88,7 @@ class StackPage {
   std::vector<Slices> pending_;  ///< of the layers that are shown, those that are not packed
   std::vector<Groups> groups_;
   std::uint64_t bytes_ = 0;  ///< of the groups, as they stand in the page
+  std::optional<StagedOutput> output_;
 };
 
 }  // namespace vdbdither

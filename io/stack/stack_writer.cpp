@@ -168,7 +168,7 @@ const Manifest& StackWriter::finish() {
   } else {
     encoder_.finish(stack_, preview_.picture(), output_);
   }
-  output_.commit();
+  output_.complete();
   return stack_;
 }
 

@@ -21,7 +21,7 @@ struct BlankLayers {
 /// folder with the slices as they will be, besides their numbers, and with every layer.
 enum class StackPart { whole, piece };
 
-/// Writes a stack of slices, layer by layer. It exists under its name once it is complete.
+/// Writes a stack of slices, layer by layer. It exists under its name once it is committed.
 class StackWriter {
  public:
   /// @param stack    all but its layers, slices and voxels
@@ -43,8 +43,10 @@ class StackWriter {
   /// Throws DataError as `add` does, and for a piece of something else.
   void takePiece(const std::filesystem::path& folder);
 
-  /// Completes the stack and gives it its name. Returns what its manifest says.
+  /// Completes the stack. Returns what its manifest says.
   const Manifest& finish();
+  /// Gives the stack that `finish` completed its name. Throws DataError.
+  void commit() { output_.commit(); }
 
  private:
   struct Layer;

@@ -80,6 +80,37 @@ class Chain(ProgramTest):
         self.succeed(*chain, "write", "out.vdb", "!", "slice-export", "out")
         self.succeed("verify", "out", "--against", "out.vdb")
 
+    def test_grids_of_a_shape_that_changed_are_dropped_with_one_warning(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.box((2, 2, 2)))
+        start = ("mesh2sdf", "part.stl", "--pitch", "0.1mm,0.1mm,0.1mm", "--band", "0.8mm")
+        meshes.write_stl(self.folder / "other.stl", meshes.box((1, 1, 1)))
+        self.succeed("mesh2sdf", "other.stl", *start[2:], "-o", "other.vdb")
+        dithered = (*start, "!", "dither", "--mask", "none")
+        for step in (("hollow", "--thickness", "0.2mm"), ("offset", "--by", "-0.2mm"), ("csg", "--difference", "other.vdb"), ("compensate",)):
+            told = f"vdbdither {step[0]}: warning: drops 'solid', which describes the shape before it; make it after {step[0]}, not before\n"
+            with self.subTest(step=step):
+                plan = json.loads(self.run_program(*dithered, "!", *step, "-o", "x.vdb", "--explain", "--json").stdout)
+                self.assertNotIn("solid", plan["stages"][-1]["grids"])
+                self.assertEqual(self.run_program(*dithered, "!", *step, "!", "info").stderr.decode(), told)
+                refused = self.run_program(*dithered, "!", *step, "!", "slice-export", "new")
+                self.assertEqual(refused.returncode, 2)
+                self.assertTrue(refused.stderr.decode().startswith(told + "vdbdither slice-export: needs a grid 'material' or 'solid'"))
+                # What is made again needs no word.
+                self.succeed(*dithered, "!", "material-assign", "-o", "old.vdb", "--overwrite")
+                again = self.run_program("read", "old.vdb", "!", *step, "!", "dither", "!", "material-assign", "!", "slice-export", "out", "--overwrite")
+                self.assertEqual((again.returncode, again.stderr), (0, b""))
+
+    def test_materials_of_voxels_that_changed_are_dropped_with_one_warning(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.5))
+        start = ("mesh2sdf", "part.stl", "--printer", "mimaki-3duj-553", "!", "dither", "!", "material-assign", "!", "simulate", "!")
+        for step in ("dither", "interlace", "refine"):
+            with self.subTest(step=step):
+                self.assertEqual(self.run_program(*start, step, "!", "info").stderr.decode(),
+                                 f"vdbdither {step}: warning: drops 'material', 'printed', which describe the shape before it; "
+                                 f"make them after {step}, not before\n")
+                again = self.run_program(*start, step, "!", "material-assign", "!", "simulate", "!", "info")
+                self.assertEqual((again.returncode, again.stderr), (0, b""))
+
     def test_a_layer_range_gives_exactly_those_slices(self):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(1.2))
         stages = " ! ".join(self.chain("mimaki-3duj-553", "part.stl"))

@@ -209,6 +209,47 @@ class Refusals(ProgramTest):
         self.refuse(2, "'out' exists; --overwrite replaces it", *chain)
         self.succeed(*chain, "--overwrite")
 
+    def test_overwrite_behind_any_operator_is_for_all_outputs(self):
+        chain = ("mesh2sdf", "part.stl", *MIMAKI)
+        end = ("!", "dither", "!", "slice-export", "out", "!", "write", "a.vdb")
+        self.succeed(*chain, *end)
+        self.succeed(*chain, "--overwrite", *end)
+        self.succeed(*chain, "!", "dither", "--overwrite", *end[2:], "!", "mesh-export", "a.stl")
+        # One that is behind an output is for this output.
+        self.refuse(2, "'out' exists; --overwrite replaces it", *chain, *end, "--overwrite")
+
+    def test_a_sink_that_fails_leaves_all_outputs_as_they_were(self):
+        def chain(scale):
+            return ("mesh2sdf", "box.stl", *MIMAKI, "--scale", scale, "--overwrite", "!", "dither", "--mask", "none", "!", "write", "a.vdb",
+                    "!", "slice-export", "out", "--page", "out.html", "!", "mesh-export", "a.stl")
+
+        # Made small, it holds the centre of no voxel.
+        meshes.write_stl(self.folder / "box.stl", meshes.box((1, 1, 1), (0.3, 0.3, 0.3)))
+        self.succeed(*chain(1))
+
+        def contents():
+            return {path: path.read_bytes() for path in self.folder.rglob("*") if path.is_file()}
+
+        kept = contents()
+        self.assertIn(self.folder / "out.html", kept)
+        failed = self.run_program(*chain(0.001))
+        self.assertEqual(failed.returncode, 1)
+        self.assertIn("mesh-export: grid 'solid' has no surface", failed.stderr.decode())
+        self.assertEqual(contents(), kept)
+
+    def test_explain_takes_outputs_that_exist_and_tells_of_them(self):
+        (self.folder / "holiday").mkdir()
+        (self.folder / "holiday/beach.jpg").write_bytes(b"sand")
+        chain = ("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "write", "a.vdb", "!", "slice-export")
+        self.assertNotIn("exists", self.succeed(*chain, "out", "--explain").decode())
+        self.succeed(*chain, "out")
+        for folder in ("out", "holiday"):
+            text = self.succeed(*chain, folder, "--explain").decode()
+            for name in ("a.vdb", folder):
+                self.assertIn(f" for {name}, which exists: --overwrite replaces it\n", text)
+        plan = json.loads(self.succeed(*chain, "new", "--explain", "--json"))
+        self.assertEqual([stage["output"]["exists"] for stage in plan["stages"][2:]], [True, False])
+
     def test_a_folder_without_a_stack_is_never_replaced(self):
         (self.folder / "holiday").mkdir()
         (self.folder / "holiday/beach.jpg").write_bytes(b"sand")

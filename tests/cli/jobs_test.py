@@ -228,6 +228,13 @@ class Jobs(ProgramTest):
         surface = self.succeed("mesh2sdf", "part.stl", *MIMAKI)
         self.refuse(2, "read: reads a pipe, which other machines cannot", "plan", "dither ! slice-export out", "--pieces", "2", input=surface)
 
+    def test_names_that_are_not_utf_8_are_refused(self):
+        name = os.fsdecode(b"bad\xff")
+        shutil.copy(self.folder / "part.stl", self.folder / f"{name}.stl")
+        for chain in (f"mesh2sdf {name}.stl --printer mimaki-3duj-553 ! dither ! slice-export out", f"{DITHER} ! slice-export {name}"):
+            self.refuse(2, "is not UTF-8, and a job keeps names as UTF-8; rename the file", "plan", chain, "--pieces", "2")
+        self.assertFalse((self.folder / "job").exists())
+
     def test_numbers_that_are_none_of_a_piece_are_refused(self):
         self.plan(f"{DITHER} ! slice-export out")
         for numbers in ("4", "0-4", "-1", "2-1", "1,1", "1,,2", "x", "0x1", "99999999999999999999"):

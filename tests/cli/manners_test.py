@@ -201,6 +201,16 @@ class Manners(ProgramTest):
         self.succeed("slice-import", "some", "--layers", layers, "-o", "x.vdb")
         self.succeed("run", f"mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! compare x.vdb --grids solid --layers {layers}")
 
+    def test_a_stack_of_fewer_layers_than_a_group_names_the_groups_to_export(self):
+        meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.8))
+        chain = "mesh2sdf part.stl --printer mimaki-3duj-553 ! dither ! slice-export some --overwrite --layers "
+        self.succeed("run", chain + "21:25")
+        said = self.refuse(1, "'some' lacks layer 0; a stack is read in whole groups of eight layers, and it has 21:25; "
+                           "export such groups: slice-export --layers ", "slice-import", "some", "-o", "x.vdb").stderr.decode()
+        layers = re.search(r"slice-export --layers (\d+:\d+)", said)[1]
+        self.succeed("run", chain + layers)
+        self.succeed("slice-import", "some", "--layers", layers, "-o", "x.vdb")
+
 
 if __name__ == "__main__":
     unittest.main()

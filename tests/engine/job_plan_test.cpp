@@ -110,9 +110,17 @@ TEST(JobPlan, IsToldToProgramsAsOneLineOfJson) {
   const json& third = plan["stages"][2];
   EXPECT_EQ(third["kind"], "sink");
   EXPECT_EQ(third["barrier"], true);
-  EXPECT_EQ(
-      third["output"],
-      json({{"path", "out.vdb"}, {"bytes", 3 * 1048576.0}, {"free_bytes", 9 * 1073741824.0}}));
+  EXPECT_EQ(third["output"], json({{"path", "out.vdb"},
+                                   {"exists", false},
+                                   {"bytes", 3 * 1048576.0},
+                                   {"free_bytes", 9 * 1073741824.0}}));
+}
+
+TEST(JobPlan, TellsOfAnOutputThatExists) {
+  JobPlan plan = example();
+  plan.stages[2].output_exists = true;
+  EXPECT_THAT(toText(plan), HasSubstr(" for out.vdb, which exists: --overwrite replaces it\n"));
+  EXPECT_EQ(json::parse(toJson(plan))["stages"][2]["output"]["exists"], true);
 }
 
 TEST(JobPlan, UnknownFiguresAreNullInJson) {

@@ -138,5 +138,28 @@ TEST(Pipeline, AnErrorNamesItsStageAndNothingIsPublished) {
   EXPECT_THAT(test::notes().calls, Not(Contains("keep finish")));
 }
 
+TEST(Pipeline, AllSinksFinishBeforeTheFirstPublishes) {
+  keptBy("numbers --top 8 ! keep --file a ! keep --file b");
+  EXPECT_THAT(test::notes().calls, ElementsAre("numbers 0:8", "keep 0:8", "keep 0:8", "keep finish",
+                                               "keep finish", "publish b", "publish a"));
+}
+
+TEST(Pipeline, ASinkThatFailsToFinishLeavesAllUnpublished) {
+  for (const char* line : {"keep --fail-to-finish ! keep", "keep ! keep --fail-to-finish"}) {
+    Job job("numbers --top 8 ! " + std::string(line));
+    EXPECT_THAT([&] { job.pipeline.run(); }, ThrowsMessage<DataError>("keep: cannot finish"));
+    EXPECT_THAT(callsOf("publish"), testing::IsEmpty()) << line;
+  }
+}
+
+TEST(Pipeline, AFailureToPublishTellsWhatIsPublishedAlready) {
+  Job last("numbers --top 8 ! keep --file a ! keep --fail-to-publish");
+  EXPECT_THAT([&] { last.pipeline.run(); }, ThrowsMessage<DataError>("keep: cannot publish"));
+  Job first("numbers --top 8 ! keep --fail-to-publish ! keep --file a ! keep --file b");
+  EXPECT_THAT(
+      [&] { first.pipeline.run(); },
+      ThrowsMessage<DataError>("keep: cannot publish; of this run there is already 'b', 'a'"));
+}
+
 }  // namespace
 }  // namespace vdbdither

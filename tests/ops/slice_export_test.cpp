@@ -80,6 +80,7 @@ struct Export {
     for (const Slab& slab : test::cutIntoSlabs(job.grids, job.schema.lattice, height))
       sink().write(slab);
     sink().finish();
+    sink().publish();
   }
 
   std::unique_ptr<Operator> made;

@@ -174,7 +174,11 @@ class Join : public Filter {
 
 class Keep : public Sink {
  public:
-  void declare(Options&) override {}
+  void declare(Options& options) override {
+    options.text("file", file_, "NAME", "Name of the output");
+    options.flag("fail-to-finish", fails_to_finish_, "Fails when it finishes");
+    options.flag("fail-to-publish", fails_to_publish_, "Fails when it publishes");
+  }
   void plan(const Schema&) override {}
   [[nodiscard]] std::optional<std::vector<std::string>> reads() const override {
     return std::vector<std::string>{"n"};
@@ -182,14 +186,26 @@ class Keep : public Sink {
   [[nodiscard]] std::optional<Work> work() const override {
     return Work{.us_per_held_leaf = 10, .seconds = 1};
   }
-  [[nodiscard]] OutputEstimate output() const override { return {"kept.txt", 1000}; }
+  [[nodiscard]] OutputEstimate output() const override { return {file_, 1000}; }
   void write(const Slab& in) override {
     note("keep " + layersText(in.core));
     const auto n = findGrid<Int32Grid>(in.grids, "n");
     for (int z = in.core.begin; z < in.core.end; ++z)
       mutableNotes().kept.emplace_back(z, valueAt(*n, z));
   }
-  void finish() override { note("keep finish"); }
+  void finish() override {
+    if (fails_to_finish_) throw DataError("cannot finish");
+    note("keep finish");
+  }
+  void publish() override {
+    if (fails_to_publish_) throw DataError("cannot publish");
+    note("publish " + file_);
+  }
+
+ private:
+  std::string file_ = "kept.txt";
+  bool fails_to_finish_ = false;
+  bool fails_to_publish_ = false;
 };
 
 template <typename Type>

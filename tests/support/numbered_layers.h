@@ -16,12 +16,14 @@ namespace vdbdither::test {
 /// * `enlarge --by K`: a filter; adds K layers below and above the box, and a grid `seen`, a copy
 ///   of n.
 /// * `join --bottom A --top B --pipe`: a filter; adds the n of an input of its own.
-/// * `keep`: a sink; notes the n of every layer. Costs 10 µs for each leaf and 1 s.
+/// * `keep --file NAME`: a sink; notes the n of every layer. Costs 10 µs for each leaf and 1 s. It
+///   fails with `--fail-to-finish` and `--fail-to-publish`.
 const OperatorInfo& findNumbered(std::string_view name);
 
 /// What the operators noted since the last `clearNotes`.
 struct Notes {
-  std::vector<std::string> calls;         ///< `sum 0:8`, `keep finish`, `input read 0:8`, …
+  std::vector<std::string>
+      calls;  ///< `sum 0:8`, `keep finish`, `publish NAME`, `input read 0:8`, …
   std::vector<std::pair<int, int>> kept;  ///< layer and n, as they came to `keep`
 };
 const Notes& notes();

@@ -19,6 +19,7 @@ void SinkCalled::run(const Schema& schema, const Grids& grids, int height) const
   for (const Slab& slab : cutIntoSlabs(grids, schema.lattice, height)) sink.write(slab);
   for (Input* input : sink.inputs()) input->readToEnd();
   sink.finish();
+  sink.publish();
 }
 
 FileToolCalled::FileToolCalled(const std::string& name, const std::vector<std::string>& arguments)

@@ -105,6 +105,7 @@ Chain::Chain(const std::vector<Step>& steps, const FindOperator& find) {
   }
   addRead(find);
   addWrite(find);
+  if (options_.overwrite) overwriteAll();
 }
 
 void Chain::addStage(const Step& step, const FindOperator& find) {
@@ -147,11 +148,15 @@ void Chain::addWrite(const FindOperator& find) {
     throw UsageError("--output: the chain ends with " + stages_.back()->name() +
                      ", which names its own output");
   }
-  std::vector<std::string> arguments{options_.output.empty() ? "-" : options_.output};
-  if (options_.overwrite) arguments.emplace_back("--overwrite");
+  const std::vector<std::string> arguments{options_.output.empty() ? "-" : options_.output};
   auto stage = std::make_unique<Stage>(find("write"));
   stage->parse(arguments, run_options_);
   stages_.push_back(std::move(stage));
+}
+
+void Chain::overwriteAll() {
+  for (const auto& stage : stages_)
+    if (const Option* own = stage->options().find("overwrite")) own->set("");
 }
 
 }  // namespace vdbdither

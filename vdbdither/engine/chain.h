@@ -49,6 +49,8 @@ class Chain {
   void addStage(const Step& step, const FindOperator& find);
   void addRead(const FindOperator& find);
   void addWrite(const FindOperator& find);
+  /// Sets the --overwrite of every stage that has one.
+  void overwriteAll();
 
   RunOptions options_;
   Options run_options_;  ///< bound to `options_`

@@ -130,6 +130,7 @@ ordered_json json(const StagePlan& stage, int bottom) {
   entry["output"] = nullptr;
   if (isFile(stage.output)) {
     entry["output"] = {{"path", stage.output.path},
+                       {"exists", stage.output_exists},
                        {"bytes", known(stage.output.bytes)},
                        {"free_bytes", known(stage.free_disk_bytes)}};
   }
@@ -165,7 +166,8 @@ std::string toText(const JobPlan& plan) {
     const OutputEstimate& output = stage.output;
     if (!isFile(output)) continue;
     text << "disk      " << (output.bytes > 0 ? "about " + bytesText(output.bytes) : "unknown")
-         << " of " << bytesText(stage.free_disk_bytes) << " for " << printable(output.path) << "\n";
+         << " of " << bytesText(stage.free_disk_bytes) << " for " << printable(output.path)
+         << (stage.output_exists ? ", which exists: --overwrite replaces it" : "") << "\n";
   }
   return text.str();
 }

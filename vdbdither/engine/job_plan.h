@@ -39,6 +39,7 @@ struct StagePlan {
   std::optional<Work> work;
   std::optional<double> cpu_seconds;  ///< nothing if unknown
   OutputEstimate output;              ///< of the wanted layers
+  bool output_exists = false;         ///< before the run, which needs --overwrite then
   double free_disk_bytes = 0;         ///< where the output goes
 };
 

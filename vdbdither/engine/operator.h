@@ -23,7 +23,7 @@ class Operator : public Verb {
   [[nodiscard]] virtual bool isBarrier() const { return false; }
 
   /// The files and pipes that it reads while the chain runs, besides its slabs. --explain lists
-  /// them, and the engine reads pipes to their end before any sink publishes. A filter gets their
+  /// them, and the engine reads pipes to their end before any sink finishes. A filter gets their
   /// grids in `Slab::inputs`; sources and sinks read them on their own.
   [[nodiscard]] virtual std::vector<Input*> inputs() { return {}; }
 
@@ -70,12 +70,16 @@ class Sink : public Operator {
     return std::nullopt;
   }
   virtual void write(const Slab& in) = 0;
-  /// Publishes. Before it returns, nothing exists under the name that the user gave.
+  /// Completes the output, on the disk and checked, while nothing of it exists under the name that
+  /// the user gave.
   virtual void finish() = 0;
+  /// Gives the output its name. Called once every sink of the chain has finished, so that a sink
+  /// that fails leaves the outputs of all others as they were before the run.
+  virtual void publish() {}
   /// Where its output goes, and how large it will be.
   [[nodiscard]] virtual OutputEstimate output() const { return {}; }
 
-  /// Makes `finish` publish a piece of the output: files in `folder`, which the sink makes when it
+  /// Makes `publish` publish a piece of the output: files in `folder`, which the sink makes when it
   /// writes. Called before `plan`, with the options read. Throws UsageError where the output cannot
   /// be made in pieces, as that of most sinks.
   virtual void makePiece(const std::filesystem::path& folder);

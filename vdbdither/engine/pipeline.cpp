@@ -8,6 +8,7 @@
 
 #include "vdbdither/engine/planning.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/interrupt.h"
 #include "vdbdither/model/layers.h"
 
 namespace vdbdither {
@@ -113,6 +114,21 @@ void Pipeline::join(std::span<const Piece> pieces) {
 void Pipeline::publish() {
   for (Worker& worker : workers_) {
     if (Sink* sink = worker.stage.sink()) worker.stage.monitor().timed([&] { sink->finish(); });
+  }
+  throwIfInterrupted();
+  // From the end: where that is a pipe, its reader may be gone, and then no file has its name yet.
+  std::string published;
+  for (auto worker = workers_.rbegin(); worker != workers_.rend(); ++worker) {
+    Sink* sink = worker->stage.sink();
+    if (sink == nullptr) continue;
+    try {
+      callNamed(worker->stage.name(), [&] { sink->publish(); });
+    } catch (const DataError& error) {
+      if (published.empty()) throw;
+      throw DataError(std::string(error.what()) + "; of this run there is already " + published);
+    }
+    const std::string& path = worker->plan.output.path;
+    if (!path.empty() && path != "-") published += (published.empty() ? "'" : ", '") + path + "'";
   }
 }
 

@@ -61,6 +61,7 @@ class Pipeline {
     int next_layer = 0;            ///< the first that has not come to it
   };
 
+  /// Finishes all sinks, then publishes what they made.
   void publish();
   void push(std::size_t index, Slab slab);
   void pushEmpty(std::size_t index, int end);

@@ -1,11 +1,16 @@
 #include "vdbdither/engine/planning.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <sstream>
+#include <string>
+#include <system_error>
+#include <utility>
 
 #include <tbb/task_arena.h>
 
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
 
@@ -115,6 +120,8 @@ void planOutputs(JobPlan& plan, const RunOptions& options) {
     if (output.path.empty() || output.path == "-") continue;
     const int all = stage.schema.lattice.layers().size();
     if (all > 0) output.bytes *= static_cast<double>(plan.layers.size()) / all;
+    std::error_code none;
+    stage.output_exists = std::filesystem::exists(output.path, none);
     stage.free_disk_bytes = freeDiskBytes(output.path);
     if (output.bytes > stage.free_disk_bytes && !options.explain) {
       throw DataError(stage.name + ": '" + output.path + "' needs about " +
@@ -148,14 +155,61 @@ void planLayers(JobPlan& plan, const RunOptions& options) {
   planTime(plan);
 }
 
+/// Plans the stages in order, and tells of the grids that end because a stage changed what they
+/// describe and that no later stage makes again.
+class StagesInOrder {
+ public:
+  explicit StagesInOrder(std::span<const std::unique_ptr<Stage>> stages) : stages_(stages) {}
+
+  std::vector<StagePlan> plan() {
+    try {
+      for (const auto& stage : stages_) add(*stage);
+    } catch (const Error&) {
+      // The missing grid may be what the stage refuses.
+      warn();
+      throw;
+    }
+    warn();
+    return std::move(plans_);
+  }
+
+ private:
+  void add(Stage& stage) {
+    const Schema nothing;
+    const Schema& before = plans_.empty() ? nothing : plans_.back().schema;
+    StagePlan plan = stage.plan(before);
+    for (GridNames& names : outdated_)
+      std::erase_if(names, [&](const auto& name) { return plan.schema.grids.contains(name); });
+    const std::vector<std::string> names = outdatedGrids(before, plan.schema);
+    outdated_.emplace_back(names.begin(), names.end());
+    plans_.push_back(std::move(plan));
+  }
+
+  void warn() {
+    for (std::size_t index = 0; index < outdated_.size(); ++index) {
+      const GridNames& names = outdated_[index];
+      if (names.empty()) continue;
+      std::string text;
+      for (const std::string& name : names) text += (text.empty() ? "'" : ", '") + name + "'";
+      const bool one = names.size() == 1;
+      stages_[index]->monitor().warn("drops " + text + ", which " +
+                                     (one ? "describes" : "describe") + " the shape before it; " +
+                                     "make " + (one ? "it" : "them") + " after " +
+                                     stages_[index]->name() + ", not before");
+    }
+  }
+
+  std::span<const std::unique_ptr<Stage>> stages_;
+  std::vector<StagePlan> plans_;
+  std::vector<GridNames> outdated_;  ///< of each stage, what it drops
+};
+
 }  // namespace
 
 JobPlan planJob(std::span<const std::unique_ptr<Stage>> stages, const RunOptions& options) {
   JobPlan plan;
   plan.threads = threadsOf(options);
-  const Schema nothing;
-  for (const auto& stage : stages)
-    plan.stages.push_back(stage->plan(plan.stages.empty() ? nothing : plan.stages.back().schema));
+  plan.stages = StagesInOrder(stages).plan();
   if (options.stream) refuseBarriers(plan);
   plan.layers = parseLayers(options.layers, plan.lattice().layers());
   planLayers(plan, options);

@@ -58,7 +58,10 @@ void RunOptions::declare(Options& options) {
   options.file("output", output, "FILE.vdb",
                "Writes this file instead of standard output, where the chain has no sink");
   options.letter('o');
-  options.flag("overwrite", overwrite, "Replaces the output if it exists");
+  options.flag(
+      "overwrite", overwrite,
+      "Replaces each output that exists; behind an operator with an --overwrite of its own, "
+      "the output of that operator only");
   declareWork(options);
   options.parsed(
       "slab", "N", [this](const std::string& text) { slab = checkedSlab(text); },

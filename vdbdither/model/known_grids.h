@@ -1,5 +1,9 @@
 #pragma once
 
+#include <string>
+#include <string_view>
+#include <vector>
+
 namespace vdbdither {
 
 struct Schema;
@@ -30,8 +34,12 @@ inline constexpr const char* creator_key = "creator";                ///< the wr
 /// Key of grid metadata of `part`: the maximum number that its voxels can have.
 inline constexpr const char* part_count_key = "vdbdither:parts";
 
-/// Returns `schema` without the grids that describe points of the surface (`N`, `closest`), which
-/// are wrong once the surface has moved.
-Schema withoutSurfaceExtras(Schema schema);
+/// Returns `schema` without the grids that describe what the grid `changed` was before, and those
+/// that describe these: a changed `surface` has no `solid` yet, and a changed `solid` no
+/// `material`.
+Schema withoutOutdated(Schema schema, std::string_view changed);
+
+/// The names of the grids of `before` that `after` lacks because a grid that they describe changed.
+std::vector<std::string> outdatedGrids(const Schema& before, const Schema& after);
 
 }  // namespace vdbdither

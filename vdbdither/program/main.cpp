@@ -139,6 +139,7 @@ void runChain(const std::vector<Step>& steps) {
   const Clock::time_point start = Clock::now();
   Console console(options.progress);
   console.begin(options.quiet, 0, 0);
+  if (options.explain) StagedOutput::acceptExisting();
   const JobPlan& plan = pipeline.plan(console);
   if (options.explain) {
     printData((options.json ? toJson(plan) : toText(plan)).c_str());

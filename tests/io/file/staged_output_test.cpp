@@ -141,6 +141,23 @@ TEST(StagedOutput, AFileExistsOnlyOnceCommitted) {
   EXPECT_THAT(test::filesUnder(scratch.path()), UnorderedElementsAre(Pair("a.vdb", one)));
 }
 
+TEST(StagedOutput, ACompleteOutputHasNoNameUntilItIsCommitted) {
+  const test::ScratchFolder scratch;
+  put(scratch / "old", one);
+  {
+    StagedOutput output(scratch / "old", Kind::file);
+    put(output.path(), two);
+    output.complete();
+    EXPECT_EQ(test::filesUnder(scratch.path()).at("old"), one);
+  }
+  EXPECT_THAT(test::filesUnder(scratch.path()), UnorderedElementsAre(Pair("old", one)));
+  StagedOutput output(scratch / "old", Kind::file);
+  put(output.path(), two);
+  output.complete();
+  output.commit();
+  EXPECT_THAT(test::filesUnder(scratch.path()), UnorderedElementsAre(Pair("old", two)));
+}
+
 TEST(StagedOutput, WithoutCommitNothingRemainsAndTheOldStays) {
   const test::ScratchFolder scratch;
   fs::create_directory(scratch / "out");

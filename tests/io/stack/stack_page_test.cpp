@@ -213,6 +213,7 @@ class StackPages : public testing::Test {
     StackPage page({-2, layers - 2}, {"part", manifest(layers, materials)}, {}, most_bytes);
     for (int z = 0; z < layers; ++z) page.add(z - 2, {slice(z, materials)});
     page.finish(scratch_ / "out.html");
+    page.commit();
     warning_ = page.warning();
     return Page(scratch_ / "out.html");
   }
@@ -244,6 +245,7 @@ TEST_F(StackPages, HoldEmptySlicesAndSuchThatDidNotCome) {
   StackPage page({0, 40}, {"part", manifest(40, 1)});
   page.add(20, {slice(20, 1)});
   page.finish(scratch_ / "out.html");
+  page.commit();
   const std::vector<Pixels> slices = Page(scratch_ / "out.html").slices();
   ASSERT_EQ(slices.size(), 21);
   for (int z = 0; z < 20; ++z) EXPECT_EQ(slices[z], Pixels(columns * rows)) << z;
@@ -295,6 +297,7 @@ TEST_F(StackPages, ShowSlicesFromAboveWhateverTheirLayout) {
   StackPage page({0, 1}, {"part", stack});
   page.add(0, {turned});
   page.finish(scratch_ / "out.html");
+  page.commit();
   EXPECT_EQ(Page(scratch_ / "out.html").slices()[0], pixels);
 }
 
@@ -307,6 +310,7 @@ TEST_F(StackPages, HoldAnotherStackInOneFrame) {
   StackPage page({-2, 18}, {"part", manifest(20, 3)}, PageStack{"second", other});
   for (int z = 0; z < 20; ++z) page.add(z - 2, {slice(z, 3), slice(z, 2, 99)});
   page.finish(scratch_ / "out.html");
+  page.commit();
   const Page read(scratch_ / "out.html");
   EXPECT_EQ(read.json()["size"], ordered_json({columns + 2, rows, 20}));
   EXPECT_EQ(read.json()["materials"].size(), 4);
@@ -338,6 +342,7 @@ TEST_F(StackPages, NamesOfFilesEndNoElement) {
   StackPage page({0, 1}, {hostile, stack});
   page.add(0, {slice(0, 1)});
   page.finish(scratch_ / "out.html");
+  page.commit();
   const Page read(scratch_ / "out.html");
   EXPECT_THAT(read.text(), Not(HasSubstr("alert(1)</")));
   EXPECT_THAT(read.text(), Not(HasSubstr("\x1b")));
@@ -362,6 +367,7 @@ TEST_F(StackPages, TellTheSharesOfCubesAndTheirMaterials) {
              })});
   }
   page.finish(scratch_ / "out.html");
+  page.commit();
   const Page read(scratch_ / "out.html");
   EXPECT_EQ(read.json()["volume"]["cell_mm"], 0.2);
   EXPECT_EQ(read.json()["volume"]["cells"], ordered_json({23, 30, 2}));
