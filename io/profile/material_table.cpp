@@ -88,6 +88,7 @@ MaterialTable materialTableFromJson(const std::string& text) {
   };
   MaterialTable table;
   const ordered_json json = parsedJson(text);
+  if (json.is_discarded()) throw refusal(jsonProblem(text));
   if (!json.is_array()) throw refusal("it is not a JSON list");
   for (const ordered_json& entry : json) {
     if (!entry.is_object()) throw refusal("its entries are no JSON objects");

@@ -43,7 +43,7 @@ struct CheckedProfile {
 /// \param stem  the name of the file without its ending, if the profile must have it
 CheckedProfile checkedProfile(const std::string& text,
                               const std::optional<std::string>& stem = std::nullopt) {
-  if (std::string problem = jsonSyntaxProblem(text); !problem.empty())
+  if (std::string problem = jsonProblem(text); !problem.empty())
     return {{}, {std::move(problem)}};
   const ordered_json json = parsedJson(text);
   const ProfileParser parser(json);
@@ -141,10 +141,13 @@ std::string toJson(const PrinterProfile& profile) {
 }
 
 PrinterProfile printerProfileFromJson(const std::string& text) {
-  const ProfileParser parser(parsedJson(text));
-  if (!parser.problems().empty())
-    throw DataError("the metadata vdbdither:printer is not a printer profile: " +
-                    parser.problems().front().message);
+  const auto refusal = [](const std::string& why) {
+    return DataError("the metadata vdbdither:printer is not a printer profile: " + why);
+  };
+  const ordered_json json = parsedJson(text);
+  if (json.is_discarded()) throw refusal(jsonProblem(text));
+  const ProfileParser parser(json);
+  if (!parser.problems().empty()) throw refusal(parser.problems().front().message);
   return parser.profile();
 }
 

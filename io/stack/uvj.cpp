@@ -88,7 +88,14 @@ double numberAt(const ordered_json& json, const char* path, const std::string& s
 
 ordered_json configurationOf(const StackInput& files) {
   const std::vector<std::uint8_t> bytes = files.read(configuration_name, most_configuration_bytes);
-  return parsedJson({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  ordered_json json = parsedJson(text);
+  // Others call their settings so too, in other languages.
+  const bool is_meant = text.find("\"Properties\"") != std::string_view::npos &&
+                        text.find("\"Layers\"") != std::string_view::npos;
+  if (json.is_discarded() && is_meant)
+    throw DataError("'" + files.shown(configuration_name) + "': " + jsonProblem(text));
+  return json;
 }
 
 /// Tells where the list of layers contradicts the size.
@@ -127,7 +134,6 @@ std::optional<DescribedStack> describeUvj(const StackInput& files) {
   if (!files.contains(configuration_name)) return std::nullopt;
   const std::string shown = "'" + files.shown(configuration_name) + "'";
   const ordered_json json = configurationOf(files);
-  // Others call their settings so too.
   if (!json.is_object() || !json.contains("Properties") || !json.contains("Layers"))
     return std::nullopt;
   const auto whole = [&](const char* path) {

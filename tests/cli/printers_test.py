@@ -217,6 +217,12 @@ class Printers(ProgramTest):
         self.assertRegex(problem, "^line 3, column 12: this is not JSON: ")
         self.refuse(1, "'odd.json' is not a printer profile: line 3, column 12: this is not JSON: ", "printers", "show", "odd.json")
 
+    def test_check_tells_where_a_number_is_too_large(self):
+        text = '{"name": "odd",\n "pitch_mm": [1e400, 0.1, 0.1]}'
+        self.assertEqual(self.check(text, "odd.json"), ["line 2, column 15: the number 1e400 is too large"])
+        self.refuse(1, "'odd.json' is not a printer profile: line 2, column 15: the number 1e400 is too large", "printers",
+                    "show", "odd.json")
+
     def test_problems_have_no_effect_on_a_terminal(self):
         for text in ('{"\\u001b[31m": 1}', '{"a" \x1b[31m'):
             (self.folder / "odd.json").write_text(text)

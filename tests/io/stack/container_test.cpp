@@ -147,6 +147,8 @@ TEST_F(Containers, AUvjOfOthersIsReadAsItsConfigurationSays) {
   EXPECT_EQ(refusal(), "");
   scratch_.write("config.json", replaced(uvj_text, "\"Y\": 2", "\"Y\": \"2\""));
   EXPECT_EQ(refusal(), "'config.json': '/Properties/Size/Y' must be a number");
+  scratch_.write("config.json", replaced(uvj_text, "\"Y\": 2", "\"Y\": 1e400"));
+  EXPECT_EQ(refusal(), "'config.json': line 1, column 39: the number 1e400 is too large");
   scratch_.write("config.json", replaced(uvj_text, "\"Y\": 2", "\"Y\": 0.5"));
   EXPECT_EQ(refusal(), "'config.json': '/Properties/Size/Y' must be from 1 to 16777216");
   scratch_.write("config.json", R"({"colour": "red"})");
