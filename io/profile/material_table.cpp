@@ -61,6 +61,20 @@ const Material* materialCalled(std::string_view name, std::span<const Material> 
                           : find([&](const Material& other) { return sameName(other.name, name); });
 }
 
+std::int32_t addMaterial(MaterialTable& table, const Material& material) {
+  const Material* same = materialCalled(material.name, table);
+  if (same == nullptr) {
+    table.push_back(material);
+    return static_cast<std::int32_t>(table.size());
+  }
+  if (same->name != material.name)
+    throw UsageError("'" + same->name + "' and '" + material.name +
+                     "' differ by upper and lower case only; give one another name");
+  if (same->rgba != material.rgba)
+    throw UsageError("'" + material.name + "' has two colours; give one another name");
+  return static_cast<std::int32_t>(same - table.data()) + 1;
+}
+
 std::optional<std::string> materialNameProblem(std::string_view name) {
   const auto is_plain = [](char c) {
     return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' ||

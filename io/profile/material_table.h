@@ -32,6 +32,10 @@ bool sameName(std::string_view a, std::string_view b);
 /// this name case aside; null if there is none either.
 const Material* materialCalled(std::string_view name, std::span<const Material> materials);
 
+/// Adds `material` to a table, if it is not there yet, and returns its index, from 1. Throws
+/// UsageError where the table has another material of this name, case aside.
+std::int32_t addMaterial(MaterialTable& table, const Material& material);
+
 /// Returns why options could not name a material `name`, in words that continue "the name …", or
 /// nothing if they can: it may serve as the name of a file, and has letters, digits, `-`, `_` and
 /// `.` only.
