@@ -87,7 +87,7 @@ class Dither : public Filter {
     options.choice("method", method_, methods, "How voxels are chosen");
     options.noteGiven(method_given_);
     options.choice("guard", guard_, guards, "What is left undithered");
-    options.lengths("spread", spread_mm_, "LENGTH|X,Y,Z", {0.001, 1},
+    options.lengths("spread", spread_mm_, "LENGTH|X,Y,Z", {least_spread_mm, most_spread_mm},
                     "Standard deviation of the blur of the printing process, which --method "
                     "diffusion allows for; by default that of the printer's profile, or else 50um");
     options.noteGiven(diffusion_option_);

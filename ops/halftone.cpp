@@ -203,15 +203,14 @@ class HalftoneFilter : public Filter {
     if (columns_.empty() || found == in.metadata.end()) return {};
     const MaterialTable table = materialTableFromJson(found->second);
     const bool whole = std::all_of(columns_.begin(), columns_.end(), [&](const Column& column) {
-      return std::any_of(table.begin(), table.end(),
-                         [&](const Material& ink) { return sameName(ink.name, column.name); });
+      return materialCalled(column.name, table) != nullptr;
     });
     return whole ? table : MaterialTable();
   }
 
   [[nodiscard]] std::size_t indexOf(const std::string& option, const std::string& name) const {
-    for (std::size_t ink = 0; ink < set_.inks.size(); ++ink)
-      if (sameName(set_.inks[ink].name, name)) return ink;
+    if (const Material* ink = materialCalled(name, set_.inks))
+      return static_cast<std::size_t>(ink - set_.inks.data());
     std::string message = option + ": no ink '" + name + "'; there are";
     for (const Material& ink : set_.inks) message += " " + ink.name;
     throw UsageError(message);

@@ -38,7 +38,8 @@ class MaterialAssign : public Filter {
         "default those of the colours, as halftone chooses them, where there are colours and a "
         "profile, or else the first of the profile, or white");
     options.text("parts", parts_, "NAME,...",
-                 "A material for each part, in the order of the meshes");
+                 "A material for each part, in the order of the meshes; several parts may have the "
+                 "same");
     options.text("shell", shell_, "LENGTH:NAME,...",
                  "Layers under the printed surface from the outside in, each with its thickness, "
                  "such as 0.2mm:white,0.5mm:black. The depth of a voxel is the distance from its "
@@ -64,8 +65,8 @@ class MaterialAssign : public Filter {
       addToHistory(out, halftone.name, options);
       return out;
     }
-    if (!parts_.empty()) findGrid<Int32Grid>(in.grids, part_grid);
     planTable(in);
+    if (!parts_.empty()) checkPartCount(*findGrid<Int32Grid>(in.grids, part_grid));
 
     Schema out = in;
     out.grids[material_grid] = makeMaterialGrid(solid->transform());
@@ -99,7 +100,7 @@ class MaterialAssign : public Filter {
     Int32Grid::Ptr material;
     if (!bands_.empty()) {
       material = valueByDepth(*solid, lattice_.pitch_mm, lattice_.box, in.core, in.valid, bands_,
-                              static_cast<std::int32_t>(table_.size()));
+                              core_material_);
     } else {
       material = makeMaterialGrid(solid->transform());
       material->setTree(valueWhereActive(solid->tree(), 1));
@@ -123,8 +124,10 @@ class MaterialAssign : public Filter {
     const std::vector<Material> known = printerProfileOf(in).materials;
     table_.clear();
     bands_.clear();
+    part_materials_.clear();
     if (!parts_.empty()) {
-      for (const std::string& name : materialEntries(parts_)) add("--parts", name, known);
+      for (const std::string& name : materialEntries(parts_))
+        part_materials_.push_back(add("--parts", name, known));
     } else if (!shell_.empty()) {
       double depth_mm = 0;
       for (const std::string& layer : materialEntries(shell_)) {
@@ -132,38 +135,52 @@ class MaterialAssign : public Filter {
         const auto [thickness_mm, name] =
             parseMaterialLayer("--shell", layer, thickest_mm, "0.5mm:white");
         depth_mm += thickness_mm;
-        add("--shell", name, known);
-        bands_.push_back({depth_mm, static_cast<std::int32_t>(table_.size())});
+        bands_.push_back({depth_mm, add("--shell", name, known)});
       }
-      add("--core", core_, known);
+      core_material_ = add("--core", core_, known);
     } else {
       if (material_.empty()) material_ = known.empty() ? "white" : known.front().name;
       add("--material", material_, known);
     }
   }
 
-  void add(const std::string& option, const std::string& text, const std::vector<Material>& known) {
+  /// Returns the index of the material that `text` names.
+  std::int32_t add(const std::string& option, const std::string& text,
+                   const std::vector<Material>& known) {
     try {
-      table_.push_back(parseMaterial(text, known));
+      return addMaterial(table_, parseMaterial(text, known));
     } catch (const UsageError& error) {
       throw UsageError(option + ": " + error.what());
     }
-    for (const Material& other : table_) {
-      if (other.name == table_.back().name && other.rgba != table_.back().rgba) {
-        throw UsageError(option + ": '" + other.name + "' has two colours");
-      }
+  }
+
+  /// Compares the number of materials with that of the parts, which grids of others may not tell.
+  void checkPartCount(const Int32Grid& part) {
+    const std::size_t given = part_materials_.size();
+    const auto text = [](std::size_t count, const std::string& what) {
+      return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+    };
+    const auto count = part.getMetadata<openvdb::Int32Metadata>(part_count_key);
+    if (!count) {
+      report().warn("the grid 'part' does not say how many parts there are (its metadata " +
+                    std::string(part_count_key) + "); those beyond the " + text(given, "material") +
+                    " of --parts take the last one");
+    } else if (count->value() < 0 || static_cast<std::size_t>(count->value()) != given) {
+      throw UsageError("--parts: " + text(given, "material") + " for " +
+                       text(static_cast<std::size_t>(std::max(0, count->value())), "part") +
+                       "; name one for each, in the order of the meshes");
     }
   }
 
   /// Replaces the voxels of `material` by the parts they belong to. A voxel of no part, or of one
   /// beyond the list, takes the last material.
   void takeParts(Int32Tree& material, const Int32Tree& part) const {
-    const auto count = static_cast<std::int32_t>(table_.size());
     std::atomic<std::uint64_t> strays = 0;
     const auto material_of = [&](std::int32_t index, std::uint64_t voxels) {
-      if (index >= 1 && index <= count) return index;
+      if (index >= 1 && static_cast<std::size_t>(index) <= part_materials_.size())
+        return part_materials_[static_cast<std::size_t>(index) - 1];
       strays += voxels;
-      return count;
+      return part_materials_.back();
     };
     const openvdb::tree::ValueAccessor<const Int32Tree> nodes(part);
     splitTiles(material, [&](const Coord& at) { return nodes.probeConstLeaf(at) != nullptr; });
@@ -189,7 +206,9 @@ class MaterialAssign : public Filter {
   std::unique_ptr<Filter> colours_;  ///< where colours choose the materials
   Lattice lattice_;
   MaterialTable table_;
-  std::vector<DepthBand> bands_;  ///< of the shell; the core is the last of the table
+  std::vector<DepthBand> bands_;              ///< of the shell
+  std::int32_t core_material_ = 1;            ///< beneath the shell
+  std::vector<std::int32_t> part_materials_;  ///< of each part
 };
 
 }  // namespace

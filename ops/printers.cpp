@@ -232,9 +232,11 @@ class Printers : public Tool {
   }
 
   [[nodiscard]] std::string check() const {
-    const std::vector<std::string> problems = printerProfileProblems(printer_);
+    const auto [problems, remarks] = printerProfileFindings(printer_);
     if (json_.json) {
-      print(jsonText({{"profile", printer_}, {"problems", problems}}) + "\n");
+      ordered_json json{{"profile", printer_}, {"problems", problems}};
+      json["remarks"] = problems.empty() ? remarks : std::vector<std::string>();
+      print(jsonText(json) + "\n");
     } else {
       for (const std::string& problem : problems) print(printable(problem) + "\n");
     }
@@ -242,7 +244,10 @@ class Printers : public Tool {
       throw DataError("'" + printer_ + "' has " + std::to_string(problems.size()) +
                       (problems.size() == 1 ? " problem" : " problems"));
     }
-    return json_.json ? "" : "'" + printable(printer_) + "' is a proper profile\n";
+    if (json_.json) return "";
+    std::string text = "'" + printable(printer_) + "' is a proper profile\n";
+    for (const std::string& remark : remarks) text += printable(remark) + "\n";
+    return text;
   }
 
   Action action_ = Action::list;

@@ -30,7 +30,7 @@ class Refine : public Filter {
   void declare(Options& options) override {
     options.integer("sweeps", sweeps_, {1, 8}, "How often every voxel of the surface is visited");
     options.choice("guard", guard_, guards, "What is left unrefined");
-    options.lengths("spread", spread_mm_, "LENGTH|X,Y,Z", {0.001, 1},
+    options.lengths("spread", spread_mm_, "LENGTH|X,Y,Z", {least_spread_mm, most_spread_mm},
                     "Standard deviation of the blur of the printing process; by default that of "
                     "the printer's profile, or else 50um");
   }

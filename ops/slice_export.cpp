@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -302,6 +304,7 @@ class SliceExport : public Sink {
                          background_ + "; choose another");
       }
     }
+    checkMaterialsApart();
     const std::size_t count = stack_.materials.size();
     if (count > format_->most_materials) {
       throw UsageError("--format: " + format_name_ + " has room for " +
@@ -309,6 +312,34 @@ class SliceExport : public Sink {
                        std::to_string(count) + "; take " +
                        sliceFormatNames([&](const SliceFormat& other) {
                          return other.keepsMaterials() && count <= other.most_materials;
+                       }));
+    }
+  }
+
+  /// All materials count, whether they are printed or not: what reads the slices back knows the
+  /// table, and not what the chain could print.
+  void checkMaterialsApart() const {
+    std::set<std::string> names;
+    for (const Material& material : stack_.materials) {
+      // Those of folders follow in planNames.
+      if (!names.insert(material.name).second && format_->pixel != SlicePixel::one_material)
+        throw DataError("the table of materials has '" + material.name +
+                        "' twice; assign the materials again");
+    }
+    if (format_->keepsMaterials() || !format_->showsColours()) return;
+    std::map<std::array<std::uint8_t, 4>, const Material*> colours;
+    for (const Material& material : stack_.materials) {
+      const auto [same, is_new] = colours.try_emplace(material.rgba, &material);
+      if (is_new) continue;
+      std::string colour;
+      for (const std::uint8_t channel : material.rgba)
+        colour += (colour.empty() ? "" : ",") + std::to_string(channel);
+      throw UsageError("--format: " + format_name_ + " tells materials apart by colour, and '" +
+                       same->second->name + "' and '" + material.name + "' both have " + colour +
+                       "; give one another colour where materials are assigned, as in " +
+                       material.name + "=#rrggbb, or in the profile of the printer, or take " +
+                       sliceFormatNames([&](const SliceFormat& other) {
+                         return other.keepsMaterials() && other.container_ending.empty();
                        }));
     }
   }

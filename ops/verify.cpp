@@ -58,10 +58,9 @@ std::string rounded(double value) {
 
 /// The material of a printer that a stack means, or null.
 const Material* knownMaterial(const Material& material, const std::vector<Material>& known) {
+  if (const Material* called = materialCalled(material.name, known)) return called;
   for (const Material& other : known) {
-    if (sameName(other.name, material.name) ||
-        (!other.resin.empty() && sameName(other.resin, material.name)))
-      return &other;
+    if (!other.resin.empty() && sameName(other.resin, material.name)) return &other;
   }
   const auto alike = std::find_if(known.begin(), known.end(), [&](const Material& other) {
     return other.rgba == material.rgba;

@@ -56,6 +56,7 @@ class JobParser {
  public:
   JobParser(std::string_view text, std::string shown)
       : shown_(std::move(shown)), json_(parsedJson(text)) {
+    if (json_.is_discarded()) refuse(jsonProblem(text));
     if (!json_.is_object()) refuse("it is not a JSON object");
   }
 

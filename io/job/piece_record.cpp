@@ -1,6 +1,7 @@
 #include "io/job/piece_record.h"
 
 #include <map>
+#include <string_view>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -52,12 +53,15 @@ struct Record {
 };
 
 /// The record of a folder, or nothing if it is not one.
-std::optional<Record> readRecord(const fs::path& folder) {
+/// \param problem  takes why it is not JSON
+std::optional<Record> readRecord(const fs::path& folder, std::string& problem) {
   constexpr std::uint64_t most_bytes = std::uint64_t{256} << 20;
   const fs::path path = folder / record_name;
   const std::vector<std::uint8_t> bytes =
       readWholeFile(path, "'" + path.string() + "'", most_bytes);
-  const ordered_json json = parsedJson({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const ordered_json json = parsedJson(text);
+  if (json.is_discarded()) problem = jsonProblem(text);
   try {
     Record record{{json.at("job").get<std::string>(),
                    {json.at("layers").at(0).get<int>(), json.at("layers").at(1).get<int>()}},
@@ -96,8 +100,12 @@ std::optional<std::string> pieceProblem(const fs::path& folder, const PieceOf& p
   if (!fs::is_directory(folder, none)) return "is missing";
   if (!fs::is_regular_file(folder / record_name, none))
     return "holds no " + std::string(record_name);
-  const std::optional<Record> record = readRecord(folder);
-  if (!record) return "has a " + std::string(record_name) + " that says nothing";
+  std::string problem;
+  const std::optional<Record> record = readRecord(folder, problem);
+  if (!record) {
+    return "has a " + std::string(record_name) + " that says nothing" +
+           (problem.empty() ? "" : " (" + problem + ")");
+  }
   if (record->piece != piece) return "was made for another plan of the job";
   FileDigests files = filesBelow(folder);
   for (const auto& [name, digest] : record->files) {

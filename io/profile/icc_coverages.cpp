@@ -93,13 +93,15 @@ std::vector<std::size_t> inksOfChannels(const InkOptions& options, const InkSet&
                             : std::string(" without names; name their inks")));
   std::vector<std::size_t> inks;
   for (const std::string& name : names) {
-    const auto ink = std::find_if(set.inks.begin(), set.inks.end(), [&](const Material& material) {
-      return given ? sameName(material.name, name) : isCalled(material.name, name);
-    });
-    if (ink == set.inks.end())
+    const Material* ink = materialCalled(name, set.inks);
+    for (auto other = set.inks.begin(); !given && ink == nullptr && other != set.inks.end();
+         ++other) {
+      if (isCalled(other->name, name)) ink = &*other;
+    }
+    if (ink == nullptr)
       throw UsageError("--channels: no ink '" + name + "' for a channel of the profile; there are" +
                        namesOf(set));
-    const auto index = static_cast<std::size_t>(ink - set.inks.begin());
+    const auto index = static_cast<std::size_t>(ink - set.inks.data());
     if (index == set.clear)
       throw UsageError("--channels: '" + ink->name +
                        "' is clear; a channel must be an ink with a colour");

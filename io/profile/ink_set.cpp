@@ -23,15 +23,14 @@ constexpr std::size_t most_inks = 12;
 std::vector<Material> namedInks(const std::string& text, const std::vector<Material>& known) {
   std::vector<Material> inks;
   for (const std::string& name : materialEntries(text)) {
+    const std::size_t before = inks.size();
     try {
-      inks.push_back(parseMaterial(name, known));
+      addMaterial(inks, parseMaterial(name, known));
     } catch (const UsageError& error) {
       throw UsageError(std::string("--inks: ") + error.what());
     }
-    const std::string& last = inks.back().name;
-    if (std::any_of(inks.begin(), inks.end() - 1,
-                    [&](const Material& other) { return other.name == last; }))
-      throw UsageError("--inks: '" + last + "' is there twice");
+    if (inks.size() == before)
+      throw UsageError("--inks: '" + parseMaterial(name, known).name + "' is there twice");
   }
   return inks;
 }

@@ -6,8 +6,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "vdbdither/engine/json_text.h"
-
 namespace vdbdither {
 
 using nlohmann::ordered_json;
@@ -94,37 +92,6 @@ JsonLines jsonLines(std::string_view text) {
     }
   }
   return lines;
-}
-
-namespace {
-
-/// Returns that `text` is not JSON from the byte `at` on.
-std::string problemAt(std::string_view text, std::size_t at, const std::string& what) {
-  const std::string_view before = text.substr(0, at);
-  const auto line = std::count(before.begin(), before.end(), '\n') + 1;
-  const std::size_t line_begin = before.rfind('\n') + 1;  // 0 where there is none
-  return "line " + std::to_string(line) + ", column " + std::to_string(at - line_begin + 1) +
-         ": this is not JSON: " + what;
-}
-
-}  // namespace
-
-std::string jsonSyntaxProblem(std::string_view text) {
-  if (!parsedJson(text).is_discarded()) return "";
-  try {
-    // Nothing is kept, however deep the text nests.
-    [[maybe_unused]] const ordered_json none = ordered_json::parse(
-        text, [](int, ordered_json::parse_event_t, ordered_json&) { return false; });
-  } catch (const ordered_json::parse_error& error) {
-    // "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error …"
-    const std::string what = error.what();
-    const std::size_t said = what.find(": ");
-    return problemAt(text, std::min(text.size(), error.byte > 0 ? error.byte - 1 : 0),
-                     said == what.npos ? what : what.substr(said + 2));
-  }
-  const std::size_t zero = text.find('\0');
-  if (zero != text.npos) return problemAt(text, zero, "a zero byte");
-  return "the text nests deeper than a profile";
 }
 
 }  // namespace vdbdither

@@ -28,7 +28,4 @@ struct JsonLines {
 /// \param text  JSON, no deeper than parsedJson accepts
 JsonLines jsonLines(std::string_view text);
 
-/// Returns why `text` is not JSON, with line and column, or nothing if it is.
-std::string jsonSyntaxProblem(std::string_view text);
-
 }  // namespace vdbdither

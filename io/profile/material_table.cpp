@@ -3,12 +3,12 @@
 #include "io/profile/material_table.h"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <optional>
 
 #include <nlohmann/json.hpp>
 
+#include "io/file/file_name.h"
 #include "vdbdither/engine/comma_list.h"
 #include "vdbdither/engine/json_text.h"
 #include "vdbdither/engine/option_values.h"
@@ -51,6 +51,40 @@ bool sameName(std::string_view a, std::string_view b) {
   return equalsIgnoringCase(a, lowerCase(b));
 }
 
+const Material* materialCalled(std::string_view name, std::span<const Material> materials) {
+  const auto find = [&](const auto& matches) -> const Material* {
+    const auto found = std::find_if(materials.begin(), materials.end(), matches);
+    return found == materials.end() ? nullptr : &*found;
+  };
+  const Material* exact = find([&](const Material& other) { return other.name == name; });
+  return exact != nullptr ? exact
+                          : find([&](const Material& other) { return sameName(other.name, name); });
+}
+
+std::int32_t addMaterial(MaterialTable& table, const Material& material) {
+  const Material* same = materialCalled(material.name, table);
+  if (same == nullptr) {
+    table.push_back(material);
+    return static_cast<std::int32_t>(table.size());
+  }
+  if (same->name != material.name)
+    throw UsageError("'" + same->name + "' and '" + material.name +
+                     "' differ by upper and lower case only; give one another name");
+  if (same->rgba != material.rgba)
+    throw UsageError("'" + material.name + "' has two colours; give one another name");
+  return static_cast<std::int32_t>(same - table.data()) + 1;
+}
+
+std::optional<std::string> materialNameProblem(std::string_view name) {
+  const auto is_plain = [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' ||
+           c == '_' || c == '.';
+  };
+  if (auto problem = fileNameProblem(name)) return problem;
+  if (std::all_of(name.begin(), name.end(), is_plain) && name.front() != '.') return std::nullopt;
+  return "cannot be given in options; use letters, digits, '-', '_' and '.'";
+}
+
 std::array<std::uint8_t, 4> parseColour(std::string_view text) {
   const UsageError error("'" + std::string(text) +
                          "' is not a colour; give #rrggbb or r,g,b of 0 to 255");
@@ -88,6 +122,7 @@ MaterialTable materialTableFromJson(const std::string& text) {
   };
   MaterialTable table;
   const ordered_json json = parsedJson(text);
+  if (json.is_discarded()) throw refusal(jsonProblem(text));
   if (!json.is_array()) throw refusal("it is not a JSON list");
   for (const ordered_json& entry : json) {
     if (!entry.is_object()) throw refusal("its entries are no JSON objects");
@@ -134,10 +169,7 @@ Material parseMaterial(std::string_view text, const std::vector<Material>& known
   Material material;
   const std::size_t equals = text.find('=');
   material.name = text.substr(0, equals);
-  const bool clean = std::all_of(material.name.begin(), material.name.end(), [](unsigned char c) {
-    return std::isalnum(c) || c == '-' || c == '_' || c == '.';
-  });
-  if (material.name.empty() || !clean || material.name.starts_with('.')) {
+  if (materialNameProblem(material.name)) {
     throw UsageError("'" + std::string(text) +
                      "' has no proper material name; use letters, digits, '-', '_' and '.'");
   }
@@ -147,8 +179,8 @@ Material parseMaterial(std::string_view text, const std::vector<Material>& known
   }
   std::vector<std::string> names;
   for (const std::vector<Material>* list : {&known, &usualInks()}) {
+    if (const Material* found = materialCalled(material.name, *list)) return *found;
     for (const Material& candidate : *list) {
-      if (sameName(candidate.name, material.name)) return candidate;
       if (std::find(names.begin(), names.end(), candidate.name) == names.end())
         names.push_back(candidate.name);
     }

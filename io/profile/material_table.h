@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,6 +28,19 @@ std::array<std::uint8_t, 4> parseColour(std::string_view text);
 /// Whether two names of materials are the same, case aside.
 bool sameName(std::string_view a, std::string_view b);
 
+/// Returns the material called `name`: the one of just this name or, if there is none, the first of
+/// this name case aside; null if there is none either.
+const Material* materialCalled(std::string_view name, std::span<const Material> materials);
+
+/// Adds `material` to a table, if it is not there yet, and returns its index, from 1. Throws
+/// UsageError where the table has another material of this name, case aside.
+std::int32_t addMaterial(MaterialTable& table, const Material& material);
+
+/// Returns why options could not name a material `name`, in words that continue "the name …", or
+/// nothing if they can: it may serve as the name of a file, and has letters, digits, `-`, `_` and
+/// `.` only.
+std::optional<std::string> materialNameProblem(std::string_view name);
+
 /// The entries of a list of materials, which commas part; those between the numbers of a colour do
 /// not.
 std::vector<std::string> materialEntries(const std::string& text);
@@ -41,10 +56,10 @@ struct MaterialLayer {
 MaterialLayer parseMaterialLayer(const std::string& option, const std::string& text,
                                  double thickest_mm, const std::string& example);
 
-/// Reads `name`, `name=#rrggbb`, `name=#rrggbbaa`, `name=r,g,b` or `name=r,g,b,a`; names may serve
-/// as file names. A bare name is looked up in `known`, then among the usual inks (white, black,
-/// clear, cyan, magenta, yellow and their Vero names), case aside. Throws UsageError with what
-/// would have been accepted.
+/// Reads `name`, `name=#rrggbb`, `name=#rrggbbaa`, `name=r,g,b` or `name=r,g,b,a`;
+/// materialNameProblem must accept the name. A bare name is looked up as materialCalled does in
+/// `known`, then among the usual inks (white, black, clear, cyan, magenta, yellow and their Vero
+/// names), case aside. Throws UsageError with what would have been accepted.
 Material parseMaterial(std::string_view text, const std::vector<Material>& known);
 
 }  // namespace vdbdither

@@ -37,14 +37,24 @@ ordered_json jsonOf(const Material& material) {
 
 struct CheckedProfile {
   PrinterProfile profile;
-  std::vector<std::string> problems;  ///< by line
+  ProfileFindings findings;
 };
+
+/// In the order of the lines.
+std::vector<std::string> textsOf(std::vector<std::pair<int, std::string>> by_line) {
+  std::stable_sort(by_line.begin(), by_line.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<std::string> texts;
+  for (const auto& [line, message] : by_line)
+    texts.push_back("line " + std::to_string(line) + ": " + message);
+  return texts;
+}
 
 /// \param stem  the name of the file without its ending, if the profile must have it
 CheckedProfile checkedProfile(const std::string& text,
                               const std::optional<std::string>& stem = std::nullopt) {
-  if (std::string problem = jsonSyntaxProblem(text); !problem.empty())
-    return {{}, {std::move(problem)}};
+  if (std::string problem = jsonProblem(text); !problem.empty())
+    return {{}, {{std::move(problem)}, {}}};
   const ordered_json json = parsedJson(text);
   const ProfileParser parser(json);
   std::vector<ProfileProblem> problems = parser.problems();
@@ -58,12 +68,10 @@ CheckedProfile checkedProfile(const std::string& text,
     by_line.emplace_back(line, "'" + key + "' is there twice");
   for (const ProfileProblem& problem : problems)
     by_line.emplace_back(lines.of(problem.path), problem.message);
-  std::stable_sort(by_line.begin(), by_line.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  CheckedProfile checked{parser.profile(), {}};
-  for (const auto& [line, message] : by_line)
-    checked.problems.push_back("line " + std::to_string(line) + ": " + message);
-  return checked;
+  std::vector<std::pair<int, std::string>> remarks;
+  for (const ProfileProblem& remark : parser.remarks())
+    remarks.emplace_back(lines.of(remark.path), remark.message);
+  return {parser.profile(), {textsOf(std::move(by_line)), textsOf(std::move(remarks))}};
 }
 
 /// The file that `name_or_path` names and what it holds.
@@ -99,17 +107,17 @@ std::pair<std::filesystem::path, std::string> readProfile(const std::string& nam
 PrinterProfile readPrinterProfile(const std::string& name_or_path) {
   const auto [path, text] = readProfile(name_or_path);
   CheckedProfile checked = checkedProfile(text);
-  if (checked.problems.empty()) return std::move(checked.profile);
-  std::string message =
-      "'" + path.string() + "' is not a printer profile: " + checked.problems.front();
-  if (const std::size_t more = checked.problems.size() - 1; more > 0)
+  const std::vector<std::string>& problems = checked.findings.problems;
+  if (problems.empty()) return std::move(checked.profile);
+  std::string message = "'" + path.string() + "' is not a printer profile: " + problems.front();
+  if (const std::size_t more = problems.size() - 1; more > 0)
     message += " (and " + std::to_string(more) + " more; `vdbdither printers check` lists them)";
   throw DataError(message);
 }
 
-std::vector<std::string> printerProfileProblems(const std::string& name_or_path) {
+ProfileFindings printerProfileFindings(const std::string& name_or_path) {
   const auto [path, text] = readProfile(name_or_path);
-  return checkedProfile(text, path.stem().string()).problems;
+  return checkedProfile(text, path.stem().string()).findings;
 }
 
 std::string toJson(const PrinterProfile& profile) {
@@ -141,10 +149,13 @@ std::string toJson(const PrinterProfile& profile) {
 }
 
 PrinterProfile printerProfileFromJson(const std::string& text) {
-  const ProfileParser parser(parsedJson(text));
-  if (!parser.problems().empty())
-    throw DataError("the metadata vdbdither:printer is not a printer profile: " +
-                    parser.problems().front().message);
+  const auto refusal = [](const std::string& why) {
+    return DataError("the metadata vdbdither:printer is not a printer profile: " + why);
+  };
+  const ordered_json json = parsedJson(text);
+  if (json.is_discarded()) throw refusal(jsonProblem(text));
+  const ProfileParser parser(json);
+  if (!parser.problems().empty()) throw refusal(parser.problems().front().message);
   return parser.profile();
 }
 

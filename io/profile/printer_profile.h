@@ -8,14 +8,24 @@
 
 namespace vdbdither {
 
+/// The least and the greatest spread of droplets along an axis that can be reckoned with.
+inline constexpr double least_spread_mm = 0.001;
+inline constexpr double most_spread_mm = 1;
+
 /// Reads the profile called `name_or_path`: a file when it ends in `.json`, else
 /// `printers/NAME.json` of the data folder. Throws UsageError when there is none (naming those
 /// there are), DataError when it is malformed.
 PrinterProfile readPrinterProfile(const std::string& name_or_path);
 
-/// Everything that is wrong with the profile called `name_or_path`: texts that begin with the line
-/// of the file, in its order. Throws UsageError when there is none.
-std::vector<std::string> printerProfileProblems(const std::string& name_or_path);
+/// What is to be said of a profile: texts that begin with the line of the file, in its order.
+struct ProfileFindings {
+  std::vector<std::string> problems;  ///< a profile with any is refused
+  std::vector<std::string> remarks;   ///< of a proper profile
+};
+
+/// Everything that is to be said of the profile called `name_or_path`. Throws UsageError when there
+/// is none.
+ProfileFindings printerProfileFindings(const std::string& name_or_path);
 
 /// The profile in one line of JSON, as grids carry it under `vdbdither:printer`; and back.
 std::string toJson(const PrinterProfile& profile);

@@ -8,9 +8,12 @@
 #include <utility>
 
 #include "io/file/file_name.h"
+#include "io/profile/material_table.h"
+#include "io/profile/printer_profile.h"
 #include "vdbdither/engine/options.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/printable.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -52,6 +55,12 @@ std::optional<double> lengthMm(const ordered_json& json) {
 }
 
 }  // namespace
+
+std::span<const std::string> containerNames() {
+  static const std::vector<std::string> names{"3mf",  "exr", "gcvf", "objet", "png", "png1",
+                                              "png8", "sl1", "tiff", "tiff1", "uvj"};
+  return names;
+}
 
 ProfileParser::ProfileParser(const ordered_json& json) {
   if (!json.is_object()) {
@@ -115,11 +124,14 @@ std::string ProfileParser::text(const Object& object, const std::string& key) {
   return "";
 }
 
-std::string ProfileParser::name(const Object& object) {
+/// \param nameProblem  tells what is wrong with a name that is not empty
+std::string ProfileParser::name(
+    const Object& object,
+    const std::function<std::optional<std::string>(std::string_view)>& nameProblem) {
   std::string name = text(object, "name");
   if (!object.has("name")) {
     problem(object, "name", "there is no name");
-  } else if (const auto wrong = fileNameProblem(name); wrong && !name.empty()) {
+  } else if (const auto wrong = nameProblem(name); wrong && !name.empty()) {
     problem(object, "name", "its name " + *wrong);
   }
   return name;
@@ -182,7 +194,7 @@ openvdb::Vec3d ProfileParser::lengths3(const Object& object, const std::string& 
 
 void ProfileParser::identity(const Object& object) {
   (void)text(object, "$schema");  // for editors
-  profile_.name = name(object);
+  profile_.name = name(object, fileNameProblem);
   profile_.title = object.has("title") ? text(object, "title") : profile_.name;
   profile_.source = text(object, "source");
   profile_.technology = word(object, "technology", {"jetting", "resin"}, "");
@@ -233,14 +245,20 @@ void ProfileParser::slices(const Object& object) {
         return name.is_string() && name != "" && std::count(names.begin(), names.end(), name) == 1;
       });
   if (!proper) return problem(object, "containers", "containers must be a list of different names");
-  for (const ordered_json& name : names)
-    profile_.containers.push_back(printable(name.get<std::string>()));
+  for (const ordered_json& entry : names) {
+    const std::string name = printable(entry.get<std::string>());
+    profile_.containers.push_back(name);
+    const std::span<const std::string> known = containerNames();
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      problem(object, "containers",
+              "containers: '" + name + "' is no format of slices; give " + alternatives(known));
+    }
+  }
 }
 
 void ProfileParser::optics(const Object& object) {
-  constexpr double most_spread_mm = 10;
   if (object.has("point_spread_mm"))
-    profile_.point_spread_mm = lengths3(object, "point_spread_mm", 0, most_spread_mm);
+    profile_.point_spread_mm = lengths3(object, "point_spread_mm", least_spread_mm, most_spread_mm);
   if (object.has("yule_nielsen")) {
     constexpr double most_factor = 16;
     ordered_json factors = object["yule_nielsen"];
@@ -283,11 +301,12 @@ void ProfileParser::material(const Object& entry) {
   if (!entry.json.is_object()) return problem(entry, "", "it is not a JSON object");
   known(entry,
         {"name", "rgba", "linear_rgb", "absorption", "scattering", "density_g_per_cm3", "resin"});
-  material.name = name(entry);
+  material.name = name(entry, materialNameProblem);
   if (material.name.empty() && entry.has("name") && entry["name"].is_string())
     problem(entry, "name", "there is no name");
   material.resin = text(entry, "resin");
   appearance(entry, material);
+  remarkColour(entry, material);
   if (entry.has("density_g_per_cm3")) {
     constexpr double most = 100;
     const ordered_json& density = entry["density_g_per_cm3"];
@@ -297,10 +316,30 @@ void ProfileParser::material(const Object& entry) {
       problem(entry, "density_g_per_cm3", "density_g_per_cm3 must be a number above 0, up to 100");
     }
   }
-  for (auto other = profile_.materials.begin(); &*other != &material; ++other) {
-    if (!material.name.empty() && other->name == material.name)
-      problem(entry, "name", "'" + material.name + "' is there twice");
-  }
+  if (material.name.empty()) return;
+  const std::span<const Material> others(profile_.materials.data(), profile_.materials.size() - 1);
+  const Material* other = materialCalled(material.name, others);
+  if (other == nullptr) return;
+  problem(entry, "name",
+          "'" + material.name + "' " +
+              (other->name == material.name
+                   ? "is there twice"
+                   : "differs from '" + other->name + "' by upper and lower case only"));
+}
+
+/// Remarks that the material has the colour of one before it.
+void ProfileParser::remarkColour(const Object& entry, const Material& material) {
+  const std::span<const Material> others(profile_.materials.data(), profile_.materials.size() - 1);
+  const auto same = std::find_if(others.begin(), others.end(), [&](const Material& other) {
+    return other.rgba == material.rgba;
+  });
+  if (same == others.end()) return;
+  std::vector<std::string> path = entry.path;
+  path.emplace_back("rgba");
+  remarks_.push_back(
+      {std::move(path), entry.prefix + "'" + material.name + "' has the colour of '" + same->name +
+                            "', so that formats that tell materials apart by colour, such as png "
+                            "and gcvf, refuse jobs of both"});
 }
 
 void ProfileParser::appearance(const Object& entry, Material& material) {

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <functional>
+#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -16,6 +20,10 @@ struct ProfileProblem {
   std::string message;
 };
 
+/// The names that `containers` may list: those of all formats of slices, sorted. (The formats
+/// themselves know profiles, so they are not asked.)
+std::span<const std::string> containerNames();
+
 /// Reads a printer profile and notes all that is wrong with it.
 class ProfileParser {
  public:
@@ -23,6 +31,8 @@ class ProfileParser {
 
   [[nodiscard]] const PrinterProfile& profile() const { return profile_; }
   [[nodiscard]] const std::vector<ProfileProblem>& problems() const { return problems_; }
+  /// What is worth knowing of a proper profile.
+  [[nodiscard]] const std::vector<ProfileProblem>& remarks() const { return remarks_; }
 
  private:
   using Json = nlohmann::ordered_json;
@@ -40,7 +50,8 @@ class ProfileParser {
   void problem(const Object& object, const std::string& key, const std::string& message);
   void known(const Object& object, const std::vector<std::string>& keys);
   std::string text(const Object& object, const std::string& key);
-  std::string name(const Object& object);
+  std::string name(const Object& object,
+                   const std::function<std::optional<std::string>(std::string_view)>& nameProblem);
   std::string word(const Object& object, const std::string& key,
                    const std::vector<std::string>& words, const std::string& otherwise);
   bool flag(const Object& object, const std::string& key);
@@ -57,10 +68,12 @@ class ProfileParser {
   void mirror(const Object& entry);
   std::optional<openvdb::Vec3d> coefficients(const Object& entry, const std::string& key);
   void material(const Object& entry);
+  void remarkColour(const Object& entry, const Material& material);
   void appearance(const Object& entry, Material& material);
 
   PrinterProfile profile_;
   std::vector<ProfileProblem> problems_;
+  std::vector<ProfileProblem> remarks_;
 };
 
 }  // namespace vdbdither

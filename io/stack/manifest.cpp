@@ -84,21 +84,13 @@ class ManifestParser {
   explicit ManifestParser(const StackInput& stack) : shown_("'" + stack.shownManifest() + "'") {
     const std::vector<std::uint8_t> bytes = stack.read(stack.manifestName(), most_bytes);
     checkShape(bytes);
-    try {
-      RepeatedKey repeated;
-      ordered_json::sax_parse(bytes.begin(), bytes.end(), &repeated);
-      if (!repeated.found.empty())
-        refuse("it has the key '" + printable(shortened(repeated.found, 60)) + "' twice");
-      json_ = ordered_json::parse(bytes.begin(), bytes.end());
-      // To the parser a zero byte is the end of the text, whatever follows it.
-      const auto zero = std::find(bytes.begin(), bytes.end(), 0);
-      if (zero != bytes.end())
-        refuse("it is not JSON from byte " + std::to_string(zero - bytes.begin() + 1) + " on");
-    } catch (const ordered_json::parse_error& error) {
-      refuse("it is not JSON from byte " + std::to_string(error.byte) + " on");
-    } catch (const ordered_json::exception&) {
-      refuse("it holds a number that is too large");
-    }
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    RepeatedKey repeated;
+    ordered_json::sax_parse(text, &repeated);
+    if (!repeated.found.empty())
+      refuse("it has the key '" + printable(shortened(repeated.found, 60)) + "' twice");
+    json_ = parsedJson(text);
+    if (json_.is_discarded()) refuse(jsonProblem(text));
     if (!json_.is_object()) refuse("it is not a JSON object");
   }
 

@@ -148,11 +148,12 @@ StackPage::StackPage(ZRange layers, PageStack shown, std::optional<PageStack> ot
 void StackPage::addMaterials(const MaterialTable& materials) {
   std::vector<std::uint32_t> meaning{0};
   const bool only = materials.size() == 1 && materials_.size() == 1;
-  const std::size_t known = materials_.size();
+  const MaterialTable known = materials_;
   for (const Material& material : materials) {
     std::size_t i = 0;
-    while (!only && i < known && !sameName(materials_[i].name, material.name)) ++i;
-    if (!only && i == known) {
+    if (const Material* same = materialCalled(material.name, known)) {
+      i = static_cast<std::size_t>(same - known.data());
+    } else if (!only) {
       i = materials_.size();
       materials_.push_back(material);
     }

@@ -88,7 +88,13 @@ double numberAt(const ordered_json& json, const char* path, const std::string& s
 
 ordered_json configurationOf(const StackInput& files) {
   const std::vector<std::uint8_t> bytes = files.read(configuration_name, most_configuration_bytes);
-  return parsedJson({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  ordered_json json = parsedJson(text);
+  // Others call their settings so too, in other languages, but not their slices.
+  const std::string first_slice = folder + zeroPadded(0, number_digits) + ".png";
+  if (json.is_discarded() && files.contains(first_slice))
+    throw DataError("'" + files.shown(configuration_name) + "': " + jsonProblem(text));
+  return json;
 }
 
 /// Tells where the list of layers contradicts the size.
@@ -127,13 +133,6 @@ std::optional<DescribedStack> describeUvj(const StackInput& files) {
   if (!files.contains(configuration_name)) return std::nullopt;
   const std::string shown = "'" + files.shown(configuration_name) + "'";
   const ordered_json json = configurationOf(files);
-  const std::string first_slice = folder + zeroPadded(0, number_digits) + ".png";
-  if (!json.is_object() && files.contains(first_slice)) {
-    throw DataError(shown +
-                    " is not a JSON object, so the size of the voxels is not known; get the "
-                    "file again");
-  }
-  // Others call their settings so too.
   if (!json.is_object() || !json.contains("Properties") || !json.contains("Layers"))
     return std::nullopt;
   const auto whole = [&](const char* path) {

@@ -161,7 +161,7 @@ def voxels():
         "--spread 20um", "--spread 0.04,0.08,0.02", "--spread 0", "--slab 8 --threads 1")}
     chains |= {f"material-assign {options}": f"vdbdither material-assign -i pair.vdb {options} -o out.vdb" for options in (
         "", "--material black", "--material gold=#ffd700", "--material gold=255,215,0,200", "--parts white,black",
-        "--parts white", "--parts a=#010203,b=4,5,6,7", "--shell 0.1mm:white --core clear",
+        "--parts white,white", "--parts a=#010203,b=4,5,6,7", "--shell 0.1mm:white --core clear",
         "--shell 0.2:white,0.1:black --core cyan", "--shell 60um:own=#123456 --core white --slab 8 --threads 1",
         "--shell 5mm:white --core black")}
     chains |= {f"mask {options}": f"vdbdither mask {options} -o out.vdb" for options in (

@@ -60,6 +60,9 @@ class Chain(ProgramTest):
         meshes.write_stl(self.folder / "right.stl", meshes.box((2, 1, 1), (1.2, 0, 0)))
         self.succeed("mesh2sdf", "left.stl", "right.stl", "--printer", "mimaki-3duj-553", "!", "dither", "--mask", "none",
                      "!", "material-assign", "--parts", "white,black", "!", "slice-export", "out")
+        self.refuse(2, "material-assign: --parts: 1 material for 2 parts; name one for each, in the order of the meshes",
+                    "mesh2sdf", "left.stl", "right.stl", "--printer", "mimaki-3duj-553", "!", "dither", "!", "material-assign",
+                    "--parts", "white", "!", "slice-export", "few")
         white, black = json.loads((self.folder / "out/manifest.json").read_text())["materials"]
         self.assertEqual((white["name"], black["name"]), ("white", "black"))
         self.assertAlmostEqual(black["voxels"] / white["voxels"], 2, delta=0.1)

@@ -126,7 +126,10 @@ class Jobs(ProgramTest):
         def empty():
             (piece / "piece.json").write_text("{}")
 
-        for change, problem in ((drop, "lacks its file"), (alter, "has another"), (add, "holds a foreign file 'more'"),
+        def overflow():
+            (piece / "piece.json").write_text('{"layers": [0, 1e400]}')
+
+        for change, problem in ((overflow, "says nothing (line 1, column 16: the number 1e400 is too large)"), (drop, "lacks its file"), (alter, "has another"), (add, "holds a foreign file 'more'"),
                                 (empty, "says nothing")):
             change()
             self.refuse(1, problem, "merge", "job")
@@ -261,7 +264,11 @@ class Jobs(ProgramTest):
         damaged("makes another lattice here", lattice={**job["lattice"], "pitch_mm": [1, 1, 1]})
         damaged("cannot go to", folder="nowhere")
         path.write_text("[")
+        self.refuse(1, "is not a job of plan: line 1, column 2: this is not JSON: ", "merge", "job")
+        path.write_text("[]")
         self.refuse(1, "is not a job of plan: it is not a JSON object", "merge", "job")
+        path.write_text('{"version":\n 1e400}')
+        self.refuse(1, "is not a job of plan: line 2, column 2: the number 1e400 is too large; plan it again", "merge", "job")
 
     def test_merging_replaces_what_is_there_only_where_it_is_told_to(self):
         chain = f"{DITHER} ! slice-export out ! write solid.vdb"

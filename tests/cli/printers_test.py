@@ -19,9 +19,9 @@ WHOLE = {
     "$schema": "schema.json", "name": "whole", "title": "Whole", "source": "By definition", "technology": "resin",
     "pitch_mm": ["600dpi", 0.03, "50um"], "layer_mm": ["10um", 0.2], "build_mm": [100, "20cm", 0], "slice_px": [100, 200.0],
     "origin": "centre", "mirror_x": True, "mirror_y": True, "minimum_slices": 30, "maximum_colours": 6,
-    "containers": ["gcvf", "png"], "printer_notes": "FILEFORMAT_GOO\nB", "point_spread_mm": [0.05, 0.05, 0],
+    "containers": ["gcvf", "png"], "printer_notes": "FILEFORMAT_GOO\nB", "point_spread_mm": [0.05, "1um", 1],
     "yule_nielsen": [1, 2, 16], "kubelka_munk": {"outer": 0.04, "inner": [0.6, 0.6, 0.99]},
-    "materials": [{"name": "clear ink", "rgba": [0, 1, 2, 255], "linear_rgb": [0, 0.5, 1], "absorption": [0, 1, 2],
+    "materials": [{"name": "clear-ink", "rgba": [0, 1, 2, 255], "linear_rgb": [0, 0.5, 1], "absorption": [0, 1, 2],
                    "scattering": [3, 4, 1e9], "density_g_per_cm3": 1.18, "resin": "VeroClear"}],
 }
 
@@ -87,10 +87,10 @@ class Printers(ProgramTest):
             "slices      100 x 200 pixels, mirrored in x, mirrored in y, at least 30 of them, at most 6 colours",
             "containers  gcvf, png",
             r"notes       FILEFORMAT_GOO\nB",
-            "spread      0.05 x 0.05 x 0 mm",
+            "spread      0.05 x 0.001 x 1 mm",
             "mixing      Yule-Nielsen factor 1, 2, 16",
             "mixing      Kubelka-Munk, surface mirrors 0.04 outside, 0.6, 0.6, 0.99 inside",
-            "materials   clear ink 0,1,2,255, resin VeroClear, 1.18 g/cm3, measured 0, 0.5, 1, absorption 0, 1, 2, "
+            "materials   clear-ink 0,1,2,255, resin VeroClear, 1.18 g/cm3, measured 0, 0.5, 1, absorption 0, 1, 2, "
             "scattering 3, 4, 1e+09",
             "source      By definition"])
         shown = json.loads(self.succeed("printers", "show", "whole.json", "--json"))
@@ -100,7 +100,7 @@ class Printers(ProgramTest):
     def test_every_sample_profile_is_valid_and_states_its_source(self):
         validator = jsonschema.Draft202012Validator(SCHEMA)
         for path in PROFILES:
-            self.assertIn("is a proper profile", self.succeed("printers", "check", path).decode())
+            self.assertEqual(self.succeed("printers", "check", path).decode(), f"'{path}' is a proper profile\n")
             profile = json.loads(path.read_text())
             validator.validate(profile)
             self.assertTrue(profile["source"], path)
@@ -153,9 +153,9 @@ class Printers(ProgramTest):
             ("layer_mm",): [[0.05], [0, 0.05], ["a", 1], 1], ("build_mm",): [[1, 1, -1], [1, 1], 1],
             ("slice_px",): [[0, 1], [1.5, 1], [1, 16777217], [1], "1"], ("origin",): ["center", 1], ("mirror_x",): [1],
             ("mirror_y",): ["true"], ("minimum_slices",): [0, "30", 1.5], ("maximum_colours",): [-1, True],
-            ("containers",): ["png", [""], ["png", "png"], [1]], ("printer_notes",): [1], ("point_spread_mm",): [[0, 0, 11]],
+            ("containers",): ["png", [""], ["png", "png"], [1], ["png", "nonsense"]], ("printer_notes",): [1], ("point_spread_mm",): [[0, 0.05, 0.05], [0, 0, 0], [0.05, 0.05, 1.1]],
             ("yule_nielsen",): [0.5, [1, 2], 17], (*mirror, "inner"): [[0, 0, 1], [0, 0], 1], (*mirror, "colour"): [1],
-            (*material, "name"): ["a\\b", 1, None], (*material, "rgba"): [[0, 0, 0], [0, 0, 0, 256], [0, 0, 0, 0.5]],
+            (*material, "name"): ["a\\b", 1, None, "a,b", "c:d", "e=f", " g ", "clear ink", ".g", "gr\u00fcn"], (*material, "rgba"): [[0, 0, 0], [0, 0, 0, 256], [0, 0, 0, 0.5]],
             (*material, "linear_rgb"): [[0, 0, 2], 1], (*material, "scattering"): [[0, -1, 0]],
             (*material, "absorption"): [[1, 1]], (*material, "density_g_per_cm3"): [0, 101, "1"], (*material, "resin"): [1],
             (*material, "colour"): [1],
@@ -216,6 +216,36 @@ class Printers(ProgramTest):
         [problem] = self.check('{\n  "name": "odd"\n  "pitch_mm": [1, 1, 1]\n}', "odd.json")
         self.assertRegex(problem, "^line 3, column 12: this is not JSON: ")
         self.refuse(1, "'odd.json' is not a printer profile: line 3, column 12: this is not JSON: ", "printers", "show", "odd.json")
+
+    def test_check_lists_names_that_cannot_be_told_apart(self):
+        self.assertEqual(self.check("""{"name": "odd", "pitch_mm": [1, 1, 1], "materials": [
+            {"name": "A", "rgba": [255, 255, 255, 255]},
+            {"name": "k", "rgba": [9, 0, 0, 255]},
+            {"name": "a", "rgba": [255, 0, 0, 255]}]}""", "odd.json"), [
+            "line 4: material 3: 'a' differs from 'A' by upper and lower case only"])
+
+    def test_check_remarks_materials_of_one_colour_in_a_proper_profile(self):
+        text = """{"name": "odd", "pitch_mm": [1, 1, 1], "materials": [
+            {"name": "white", "rgba": [255, 255, 255, 255]},
+            {"name": "clear",
+             "rgba": [255, 255, 255, 255]}]}"""
+        (self.folder / "odd.json").write_text(text)
+        remark = ("line 4: material 2: 'clear' has the colour of 'white', so that formats that tell materials apart by colour, "
+                  "such as png and gcvf, refuse jobs of both")
+        self.assertEqual(self.succeed("printers", "check", "odd.json").decode(), f"'odd.json' is a proper profile\n{remark}\n")
+        self.assertEqual(json.loads(self.succeed("printers", "check", "odd.json", "--json")),
+                         {"profile": "odd.json", "problems": [], "remarks": [remark]})
+
+    def test_every_format_of_slices_may_be_a_container(self):
+        formats = re.search(r"--format ([\w|]+)", self.succeed("slice-export", "--help").decode())
+        self.assertIsNotNone(formats, self.succeed("slice-export", "--help").decode())
+        self.assertEqual(SCHEMA["properties"]["containers"]["items"]["enum"], sorted(formats[1].split("|")))
+
+    def test_check_tells_where_a_number_is_too_large(self):
+        text = '{"name": "odd",\n "pitch_mm": [1e400, 0.1, 0.1]}'
+        self.assertEqual(self.check(text, "odd.json"), ["line 2, column 15: the number 1e400 is too large"])
+        self.refuse(1, "'odd.json' is not a printer profile: line 2, column 15: the number 1e400 is too large", "printers",
+                    "show", "odd.json")
 
     def test_problems_have_no_effect_on_a_terminal(self):
         for text in ('{"\\u001b[31m": 1}', '{"a" \x1b[31m'):

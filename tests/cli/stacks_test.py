@@ -328,6 +328,30 @@ class Stacks(ProgramTest):
         (self.folder / "mine.json").write_text(json.dumps(profile))
         self.refuse(1, "material 1: its name contains '/'", "mesh2sdf", "part.stl", "--printer", "mine.json", "-o", "x.vdb")
 
+    def test_materials_of_one_colour_are_refused_where_slices_could_not_tell_them_apart(self):
+        profile = {"name": "mine", "pitch_mm": [0.1, 0.1, 0.1], "materials": [
+            {"name": "white", "rgba": [255, 255, 255, 255]}, {"name": "clear", "rgba": [255, 255, 255, 255]}]}
+        (self.folder / "mine.json").write_text(json.dumps(profile))
+        meshes.write_stl(self.folder / "part.stl", meshes.box((2, 2, 2)))
+        chain = ("mesh2sdf", "part.stl", "--printer", "mine.json", "!", "dither", "!", "material-assign", "--shell", "0.2mm:clear",
+                 "--core")
+        self.refuse(2, "slice-export: --format: png tells materials apart by colour, and 'clear' and 'white' both have "
+                       "255,255,255,255; give one another colour", *chain, "white", "!", "slice-export", "alike")
+        self.succeed(*chain, "white=#f0f0f0", "!", "slice-export", "apart")
+        self.succeed("verify", "apart")
+
+    def test_a_material_listed_twice_is_one_in_every_format(self):
+        for x, name in enumerate(("a.stl", "b.stl", "c.stl")):
+            meshes.write_stl(self.folder / name, meshes.box((1, 1, 1), (1.5 * x, 0, 0)))
+        for target in ("png", "png1", "tiff", "exr", "gcvf"):
+            name = "out.gcvf" if target == "gcvf" else target
+            self.succeed("mesh2sdf", "a.stl", "b.stl", "c.stl", "--pitch", "0.1", "!", "dither", "--mask", "none", "!",
+                         "material-assign", "--parts", "clear,white,clear", "!", "slice-export", name,
+                         *(() if target == "gcvf" else ("--format", target)))
+            self.succeed("slice-import", name, "-o", f"{target}.vdb")
+            counts = json.loads(self.succeed("stats", f"{target}.vdb", "--json"))["materials"]
+            self.assertEqual([(count["name"], count["voxels"]) for count in counts], [("clear", 2000), ("white", 1000)], target)
+
 
 if __name__ == "__main__":
     unittest.main()

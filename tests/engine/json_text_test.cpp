@@ -1,5 +1,6 @@
 #include "vdbdither/engine/json_text.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -7,6 +8,7 @@ namespace vdbdither {
 namespace {
 
 using nlohmann::ordered_json;
+using testing::StartsWith;
 
 TEST(JsonText, KeepsOrderNumbersAndText) {
   const ordered_json json = {{"b", 1.5}, {"a", {1, nullptr, true}}, {"ü", "部品 \"x\" \\ 🖨"}};
@@ -38,6 +40,32 @@ TEST(JsonText, TextThatIsNoJsonOrNestsTooDeepIsDiscarded) {
   EXPECT_TRUE(parsedJson(std::string(10'000'000, '[')).is_discarded());
   EXPECT_TRUE(parsedJson(std::string_view("1\0]", 3)).is_discarded());
   EXPECT_TRUE(parsedJson(std::string_view("{}\0", 3)).is_discarded());
+}
+
+TEST(JsonText, ProblemsHaveTheirLineAndColumn) {
+  EXPECT_EQ(jsonProblem("{\"a\": [1, 2]}"), "");
+  EXPECT_THAT(jsonProblem("{\n  \"a\": 1,\n  \"b\" 2\n}"),
+              StartsWith("line 3, column 7: this is not JSON: syntax error"));
+  EXPECT_THAT(jsonProblem("{\"a\": 1,}"), StartsWith("line 1, column 9: this is not JSON: "));
+  EXPECT_THAT(jsonProblem("{\n"), StartsWith("line 2, column 1: this is not JSON: "));
+  EXPECT_THAT(jsonProblem(""), StartsWith("line 1, column 1: this is not JSON: "));
+  EXPECT_THAT(jsonProblem("// a\n{}"), StartsWith("line 1, column 1: this is not JSON: "));
+  EXPECT_EQ(jsonProblem(std::string_view("{}\n\0]", 5)),
+            "line 2, column 1: this is not JSON: a zero byte");
+  EXPECT_EQ(jsonProblem(std::string(101, '[') + std::string(101, ']')),
+            "line 1, column 101: the text nests deeper than 100 levels");
+}
+
+TEST(JsonText, NumbersBeyondTheRangeOfDoubleAreAProblem) {
+  EXPECT_EQ(parsedJson("[1e308]")[0], 1e308);
+  for (const char* number : {"1e400", "-1e400", "1e99999"}) {
+    const std::string text = "{\n\"a\": [0.1, " + std::string(number) + "]}";
+    EXPECT_TRUE(parsedJson(text).is_discarded());
+    EXPECT_EQ(jsonProblem(text),
+              "line 2, column 12: the number " + std::string(number) + " is too large");
+  }
+  EXPECT_THAT(jsonProblem(std::string(400, '9')), StartsWith("line 1, column 1: the number 9999"));
+  EXPECT_LT(jsonProblem(std::string(400, '9')).size(), 100U);
 }
 
 }  // namespace

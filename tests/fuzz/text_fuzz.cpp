@@ -35,8 +35,7 @@ namespace {
 
 void readProfile(const std::string& text) {
   const nlohmann::ordered_json json = parsedJson(text);
-  // What nests too deep has no problem of syntax.
-  if (!jsonSyntaxProblem(text).empty()) require(json.is_discarded());
+  require(json.is_discarded() != jsonProblem(text).empty());
   const ProfileParser parser(json);
   if (json.is_discarded()) {
     require(!parser.problems().empty());

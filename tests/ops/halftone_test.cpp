@@ -85,6 +85,10 @@ TEST(Halftone, RefusesWhatItCannotDo) {
   expectRefusal("halftone", {"--inks", "white,blck"}, colours, "--inks: no material 'blck'");
   expectRefusal("halftone", {"--inks", "white,black,white"}, colours,
                 "--inks: 'white' is there twice");
+  expectRefusal("halftone", {"--inks", "white,ink=#000000,Ink=#ff0000"}, colours,
+                "--inks: 'ink' and 'Ink' differ by upper and lower case only");
+  expectRefusal("halftone", {"--inks", "white,ink=#000000,ink=#ff0000"}, colours,
+                "--inks: 'ink' has two colours; give one another name");
   expectRefusal("halftone", {"--inks", "white,black,cyan,magenta,yellow"}, colours,
                 "--inks: there are 5 materials, and the printer takes 4");
   expectRefusal("halftone", {"--inks", "clear"}, colours,

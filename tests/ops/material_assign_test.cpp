@@ -6,6 +6,7 @@
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
 #include "tests/support/drawn_grids.h"
+#include "tests/support/told.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
@@ -39,6 +40,13 @@ Schema schemaOf(const CoordBBox& box) {
   schema.lattice = {{0.05, 0.05, 0.05}, {0, 0, 0}, box};
   schema.grids["solid"] = openvdb::BoolGrid::create(false);
   return schema;
+}
+
+/// A prototype of the parts of `count` meshes.
+Int32Grid::Ptr partGrid(int count) {
+  auto grid = Int32Grid::create(0);
+  grid->insertMeta(part_count_key, openvdb::Int32Metadata(count));
+  return grid;
 }
 
 /// The layers of `grid` in its box as they are drawn.
@@ -159,6 +167,59 @@ TEST(MaterialAssign, PartsTakeTheirMaterials) {
             "11111111");
 }
 
+TEST(MaterialAssign, MaterialsListedTwiceAreOneEntryOfTheTable) {
+  const CoordBBox box(Coord(0), Coord(8, 6, 6));
+  auto solid = openvdb::BoolGrid::create(false);
+  solid->fill(box, true, true);
+  const std::vector<std::string> shell = {"--shell", "0.05mm:white,100um:ink=1,2,3", "--core",
+                                          "white=240,240,240"};
+  EXPECT_EQ(tableText(Assign(shell), schemaOf(box)), "white=240 ink=1 ");
+  Assign assign(shell);
+  assign.filter().plan(schemaOf(box));
+  EXPECT_EQ(
+      drawing(assign.filter().run({{0, 7}, {0, 7}, {{"solid", solid}}}).at("material"), box)[3],
+      (std::vector<std::string>{"111111111", "122222221", "122222221", "122111221", "122222221",
+                                "122222221", "111111111"}));
+
+  const auto part = drawnMaterial({{"123"}});
+  Schema schema = schemaOf(CoordBBox(Coord(0), Coord(2, 0, 0)));
+  schema.grids["part"] = partGrid(3);
+  EXPECT_EQ(tableText(Assign({"--parts", "clear,white,clear"}), schema), "clear=227 white=240 ");
+  Assign parts({"--parts", "clear,white,Clear"});
+  parts.filter().plan(schema);
+  const Grids grids =
+      parts.filter().run({{0, 1}, {0, 1}, {{"solid", test::solidOf(*part)}, {"part", part}}});
+  EXPECT_EQ(drawing(grids.at("material"), schema.lattice.box)[0][0], "121");
+}
+
+TEST(MaterialAssign, EachPartHasAMaterial) {
+  Schema schema = schemaOf(CoordBBox(Coord(0), Coord(2, 0, 0)));
+  schema.grids["part"] = partGrid(3);
+  const auto planned = [&](const std::string& parts) {
+    return [&schema, parts] { Assign({"--parts", parts}).filter().plan(schema); };
+  };
+  EXPECT_NO_THROW(planned("white,white,black")());
+  EXPECT_THAT(planned("white,black"),
+              ThrowsMessage<UsageError>("--parts: 2 materials for 3 parts; name one for "
+                                        "each, in the order of the meshes"));
+  EXPECT_THAT(planned("white"), ThrowsMessage<UsageError>(HasSubstr("1 material for 3 parts")));
+  EXPECT_THAT(planned("white,black,white,cyan"),
+              ThrowsMessage<UsageError>(HasSubstr("4 materials for 3 parts")));
+}
+
+TEST(MaterialAssign, WarnsWhereTheNumberOfPartsIsNotKnown) {
+  Schema schema = schemaOf(CoordBBox(Coord(0), Coord(2, 0, 0)));
+  schema.grids["part"] = Int32Grid::create(0);
+  Assign assign({"--parts", "white,black"});
+  test::Listener listener;
+  assign.made->setReporter(&listener);
+  assign.filter().plan(schema);
+  EXPECT_THAT(listener.warnings,
+              testing::ElementsAre("the grid 'part' does not say how many parts there are (its "
+                                   "metadata vdbdither:parts); those beyond the 2 materials of "
+                                   "--parts take the last one"));
+}
+
 TEST(MaterialAssign, AnEmptySlabIsFine) {
   const CoordBBox box(Coord(0), Coord(20));
   for (const std::vector<std::string>& arguments : {std::vector<std::string>{},
@@ -194,7 +255,10 @@ TEST(MaterialAssign, RefusesWhatItCannotAssign) {
               ThrowsMessage<UsageError>("--shell: '0' is not accepted; the length must be greater "
                                         "than 0 mm, up to 1000 mm"));
   EXPECT_THAT(planned({"--shell", "1:a=#000000", "--core", "a=#ffffff"}),
-              ThrowsMessage<UsageError>("--core: 'a' has two colours"));
+              ThrowsMessage<UsageError>("--core: 'a' has two colours; give one another name"));
+  EXPECT_THAT(planned({"--shell", "1:a=#000000", "--core", "A=#000000"}),
+              ThrowsMessage<UsageError>("--core: 'a' and 'A' differ by upper and lower case only; "
+                                        "give one another name"));
   EXPECT_THAT(planned({"--material", "pink"}),
               ThrowsMessage<UsageError>(HasSubstr("--material: no material 'pink'; there are")));
   EXPECT_THAT(planned({"--parts", "white"}), ThrowsMessage<DataError>(HasSubstr("no grid 'part'")));

@@ -437,6 +437,45 @@ TEST(SliceExport, RefusesWhatItCannotSlice) {
               ThrowsMessage<UsageError>(HasSubstr("has 256 bytes; the maximum is 255")));
 }
 
+TEST(SliceExport, MaterialsOfOneColourAreRefusedWhereSlicesTellThemApartByColour) {
+  const test::ScratchFolder scratch;
+  Job job = smallJob();
+  const MaterialTable alike = {{"white", {255, 255, 255, 255}}, {"clear", {255, 255, 255, 255}}};
+  const auto planned = [&](const std::vector<std::string>& arguments) {
+    return [&job, arguments] { Export(arguments).sink().plan(job.schema); };
+  };
+  job.schema.metadata[materials_key] = toJson(alike);
+  for (const char* name : {"out", "out.gcvf"}) {
+    const std::string format = name == std::string("out") ? "png" : "gcvf";
+    EXPECT_THAT(planned({scratch / name}),
+                ThrowsMessage<UsageError>(
+                    "--format: " + format +
+                    " tells materials apart by colour, and 'white' and 'clear' both have "
+                    "255,255,255,255; give one another colour where materials are assigned, as in "
+                    "clear=#rrggbb, or in the profile of the printer, or take exr, objet, png1, "
+                    "tiff or tiff1"));
+  }
+  for (const char* format : {"objet", "png1", "png8", "tiff", "tiff1"})
+    EXPECT_NO_THROW(planned({scratch / "out", "--format", format})()) << format;
+  job.schema.metadata[materials_key] =
+      toJson({{"white", {255, 255, 255, 255}}, {"clear", {255, 255, 255, 254}}});
+  EXPECT_NO_THROW(planned({scratch / "out"})());
+}
+
+TEST(SliceExport, AMaterialThatIsInTheTableTwiceIsRefused) {
+  const test::ScratchFolder scratch;
+  Job job = smallJob();
+  job.schema.metadata[materials_key] =
+      toJson({{"white", {255, 255, 255, 255}}, {"white", {255, 255, 255, 255}}});
+  for (const char* format : {"png", "tiff"}) {
+    EXPECT_THAT(([&] {
+                  Export({scratch / "out", "--format", format}).sink().plan(job.schema);
+                }),
+                ThrowsMessage<DataError>("the table of materials has 'white' twice; assign the "
+                                         "materials again"));
+  }
+}
+
 TEST(SliceExport, ATiffHasAtMost255Materials) {
   const auto planning = [](std::size_t count) {
     return [count] {

@@ -16,7 +16,12 @@ namespace vdbdither {
 std::string jsonText(nlohmann::ordered_json json, int indent = -1);
 
 /// Returns the JSON that `text` holds. The value is discarded (`is_discarded()`) if the text is not
-/// JSON, or nests deeper than 100 levels, which functions that follow the levels could not bear.
+/// JSON, nests deeper than 100 levels, which functions that follow the levels could not bear, or
+/// holds a number beyond the range of double. All JSON that is read is parsed here, but for glTF.
 nlohmann::ordered_json parsedJson(std::string_view text);
+
+/// Returns why parsedJson discards `text`, with line and column, or nothing if it does not:
+/// "line 3, column 12: this is not JSON: …".
+std::string jsonProblem(std::string_view text);
 
 }  // namespace vdbdither

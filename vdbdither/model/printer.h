@@ -52,7 +52,7 @@ struct PrinterProfile {
   bool mirror_y = false;                ///< it takes slices mirrored, top to bottom
   int minimum_slices = 0;               ///< of a job; zero where unknown
   int maximum_colours = 0;              ///< of a job, besides the background; zero where unknown
-  std::vector<std::string> containers;  ///< formats of slices it takes, such as gcvf; a free list
+  std::vector<std::string> containers;  ///< formats of slices it takes, such as gcvf
   std::string printer_notes;            ///< for SL1 files, such as FILEFORMAT_GOO
   /// How far a droplet spreads: standard deviation of a Gaussian along each axis; zero where
   /// unknown.

@@ -9,7 +9,6 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::Pair;
-using testing::StartsWith;
 using Path = std::vector<std::string>;
 
 TEST(JsonLines, TellTheLineOfEveryKeyAndElement) {
@@ -48,20 +47,6 @@ TEST(JsonLines, WhatIsNotThereHasTheLineOfWhatWouldHoldIt) {
 TEST(JsonLines, TellKeysThatAreThereTwice) {
   const JsonLines lines = jsonLines("{\"a\": {\"b\": 1},\n\"c\": {\"b\": 2,\n\"b\": 3}, \"a\": 4}");
   EXPECT_THAT(lines.repeated, ElementsAre(Pair(3, "b"), Pair(3, "a")));
-}
-
-TEST(JsonSyntaxProblem, TellsLineAndColumn) {
-  EXPECT_EQ(jsonSyntaxProblem("{\"a\": [1, 2]}"), "");
-  EXPECT_THAT(jsonSyntaxProblem("{\n  \"a\": 1,\n  \"b\" 2\n}"),
-              StartsWith("line 3, column 7: this is not JSON: syntax error"));
-  EXPECT_THAT(jsonSyntaxProblem("{\"a\": 1,}"), StartsWith("line 1, column 9: this is not JSON: "));
-  EXPECT_THAT(jsonSyntaxProblem("{\n"), StartsWith("line 2, column 1: this is not JSON: "));
-  EXPECT_THAT(jsonSyntaxProblem(""), StartsWith("line 1, column 1: this is not JSON: "));
-  EXPECT_THAT(jsonSyntaxProblem("// a\n{}"), StartsWith("line 1, column 1: this is not JSON: "));
-  EXPECT_EQ(jsonSyntaxProblem(std::string_view("{}\n\0]", 5)),
-            "line 2, column 1: this is not JSON: a zero byte");
-  EXPECT_EQ(jsonSyntaxProblem(std::string(101, '[') + std::string(101, ']')),
-            "the text nests deeper than a profile");
 }
 
 }  // namespace

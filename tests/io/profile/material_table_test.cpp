@@ -60,6 +60,15 @@ TEST(MaterialTable, NamesAreThePrintersThenTheUsualInks) {
   EXPECT_THAT(parseMaterial("veroclear", known).rgba, ElementsAre(227, 233, 253, 255));
 }
 
+TEST(MaterialTable, TheExactNameIsFoundBeforeOneOfAnotherCase) {
+  const std::vector<Material> known = {{"A", {1, 0, 0, 255}}, {"a", {2, 0, 0, 255}}};
+  EXPECT_EQ(parseMaterial("a", known).name, "a");
+  EXPECT_EQ(parseMaterial("A", known).name, "A");
+  EXPECT_EQ(materialCalled("a", known), &known[1]);
+  EXPECT_EQ(materialCalled("b", known), nullptr);
+  EXPECT_EQ(materialCalled("a", std::span(known).first(1)), known.data());
+}
+
 TEST(MaterialTable, ColoursAreHexadecimalOrDecimal) {
   EXPECT_THAT(parseMaterial("a=#0aff10", {}).rgba, ElementsAre(10, 255, 16, 255));
   EXPECT_THAT(parseMaterial("a=#0aFF1080", {}).rgba, ElementsAre(10, 255, 16, 128));
@@ -84,7 +93,8 @@ TEST(MaterialTable, RefusalsNameWhatThereIs) {
           "no material 'pink'; there are white Rubber VeroPureWht black VeroBlack clear VeroClear "
           "cyan VeroCyan magenta VeroMgnt yellow VeroYellow, and any other with its colour, as in "
           "pink=#rrggbb"));
-  for (const char* text : {"", "=#000000", "a/b=#000000", "..=#000000", "a b=#000000"}) {
+  for (const char* text :
+       {"", "=#000000", "a/b=#000000", "..=#000000", "a b=#000000", "a:b=#000000", " a=#000000"}) {
     EXPECT_THAT([&] { parseMaterial(text, {}); },
                 ThrowsMessage<UsageError>(HasSubstr("has no proper material name")))
         << text;

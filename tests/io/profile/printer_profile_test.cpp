@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "io/profile/profile_parser.h"
+#include "io/stack/slice_format.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -13,6 +15,7 @@ using openvdb::Vec2i;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
+using testing::UnorderedElementsAreArray;
 
 const std::string least = R"("name": "p", "pitch_mm": [0.04, 0.08, 0.05])";
 
@@ -81,6 +84,34 @@ TEST(PrinterProfile, RefusesWrongFieldsOfSlices) {
                   "containers must be a list of different names");
 }
 
+TEST(PrinterProfile, ContainersAreFormatsOfSlices) {
+  std::vector<std::string> formats;
+  for (const SliceFormat* format : sliceFormats()) formats.emplace_back(format->name);
+  EXPECT_THAT(containerNames(), UnorderedElementsAreArray(formats));
+  expectRefused(R"("containers": ["png", "nonsense"])",
+                "containers: 'nonsense' is no format of slices; give 3mf, exr, gcvf, objet, png, "
+                "png1, png8, sl1, tiff, tiff1 or uvj");
+}
+
+TEST(PrinterProfile, RefusesNamesOfMaterialsThatOptionsCannotGive) {
+  const auto named = [](const std::string& name) {
+    return R"("materials": [{"name": ")" + name + R"(", "rgba": [0, 0, 0, 255]}])";
+  };
+  for (const char* name : {"a,b", "c:d", "e=f", " g ", "a b", ".a", "gr\u00fcn"})
+    expectRefused(named(name),
+                  "material 1: its name cannot be given in options; use letters, digits, '-', '_' "
+                  "and '.'");
+  expectRefused(named(std::string(256, 'a')),
+                "material 1: its name has 256 bytes; the maximum is 255");
+  EXPECT_EQ(profileWith(named("Vero-C_1.5")).materials[0].name, "Vero-C_1.5");
+}
+
+TEST(PrinterProfile, RefusesNamesOfMaterialsThatDifferByCaseOnly) {
+  expectRefused(R"("materials": [{"name": "A", "rgba": [0, 0, 0, 255]},
+                                 {"name": "a", "rgba": [9, 0, 0, 255]}])",
+                "material 2: 'a' differs from 'A' by upper and lower case only");
+}
+
 TEST(PrinterProfile, MayHaveNoNameInMetadata) {
   EXPECT_EQ(printerProfileFromJson(R"({"name": "", "pitch_mm": [1, 1, 1]})").name, "");
   EXPECT_THAT([] { printerProfileFromJson(R"({"pitch_mm": [1, 1, 1]})"); },
@@ -95,6 +126,15 @@ TEST(PrinterProfile, RefusesLayersOutOfTheirRange) {
   expectRefused(R"("layer_mm": [0.06, 0.2])",
                 "layer_mm must include the layer of pitch_mm, 0.05 mm");
   EXPECT_EQ(profileWith(R"("layer_mm": [0.05, 0.05])").layer_mm, Vec2d(0.05, 0.05));
+}
+
+TEST(PrinterProfile, RefusesSpreadsThatCannotBeReckonedWith) {
+  for (const char* spread :
+       {"[0, 0.05, 0.05]", "[0.05, 0.0009, 0.05]", "[0, 0, 0]", "[0.05, 0.05, 1.01]", "0.05"})
+    expectRefused(R"("point_spread_mm": )" + std::string(spread),
+                  "point_spread_mm must be three lengths between 0.001 and 1 mm");
+  EXPECT_EQ(profileWith(R"("point_spread_mm": [0.001, "50um", 1])").point_spread_mm,
+            openvdb::Vec3d(0.001, 0.05, 1));
 }
 
 TEST(PrinterProfile, RefusesWrongFieldsOfMaterials) {

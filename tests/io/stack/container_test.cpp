@@ -147,12 +147,13 @@ TEST_F(Containers, AUvjOfOthersIsReadAsItsConfigurationSays) {
   EXPECT_EQ(refusal(), "");
   scratch_.write("config.json", replaced(uvj_text, "\"Y\": 2", "\"Y\": \"2\""));
   EXPECT_EQ(refusal(), "'config.json': '/Properties/Size/Y' must be a number");
+  scratch_.write("config.json", replaced(uvj_text, "\"Y\": 2", "\"Y\": 1e400"));
+  EXPECT_EQ(refusal(), "'config.json': line 1, column 39: the number 1e400 is too large");
   scratch_.write("config.json", replaced(uvj_text, "\"Y\": 2", "\"Y\": 0.5"));
   EXPECT_EQ(refusal(), "'config.json': '/Properties/Size/Y' must be from 1 to 16777216");
   scratch_.write("config.json", std::string(uvj_text).substr(0, 60));
-  EXPECT_EQ(refusal(),
-            "'config.json' is not a JSON object, so the size of the voxels is not known; "
-            "get the file again");
+  EXPECT_THAT(refusal(), HasSubstr("'config.json': line "));
+  EXPECT_THAT(refusal(), HasSubstr(": this is not JSON: "));
   scratch_.write("config.json", R"({"colour": "red"})");
   EXPECT_THAT(refusal(), EndsWith("holds no manifest.json, so it is not a stack made by "
                                   "slice-export"));
