@@ -15,6 +15,7 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 using testing::EndsWith;
+using testing::HasSubstr;
 
 constexpr const char* gcvf_text = R"(<?xml version="1.0" encoding="UTF-8"?>
 <GCVF><Version>2</Version>
