@@ -111,7 +111,7 @@ class FullDisk(ProgramTest):
 
     def test_a_mask_that_cannot_be_kept_is_a_warning(self):
         self.resize(16)
-        done = self.run_program("dither", "-i", self.inputs / "part.vdb", "--size", 32,
+        done = self.run_program("read", self.inputs / "part.vdb", "--grids", "surface", "!", "dither", "--size", 32,
                                 env={**os.environ, "XDG_CACHE_HOME": str(self.disk)})
         self.assertEqual(done.returncode, 0)
         self.assertRegex(done.stderr.decode(), r"\A[^\n]*warning: the mask is not kept for the next run: "

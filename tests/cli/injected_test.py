@@ -121,9 +121,9 @@ class Reached(ProgramTest):
         meshes.write_stl(self.folder / "part.stl", meshes.sphere(0.6))
 
     def test_a_limit_of_open_files_is_reported(self):
-        self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "-o", "part.vdb")
+        self.succeed("mesh2sdf", "part.stl", *MIMAKI, "!", "write", "surface.vdb", "!", "dither", "-o", "part.vdb")
         for arguments in (("mesh2sdf", "part.stl", *MIMAKI, "!", "dither", "!", "slice-export", "out"),
-                          ("slice-export", "-i", "part.vdb", "out.zip"), ("csg", "-i", "part.vdb", "--union", "part.vdb", "-o", "out.vdb")):
+                          ("slice-export", "-i", "part.vdb", "out.zip"), ("csg", "-i", "surface.vdb", "--union", "part.vdb", "-o", "out.vdb")):
             refused = 0
             for files in range(4, 40):
                 done = self.run_program(*arguments, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (files, files)))

@@ -75,7 +75,9 @@ class SliceFormats : public testing::TestWithParam<const SliceFormat*> {
       for (int layer = piece.begin; layer < piece.end; ++layer) images.push_back(image(layer));
       writer.add(piece, images, {});
     }
-    return writer.finish();
+    Manifest written = writer.finish();
+    writer.commit();
+    return written;
   }
 
   test::ScratchFolder scratch_;
@@ -139,7 +141,9 @@ Manifest writeCropped(const std::filesystem::path& target, const Manifest& stack
     }
     writer.add(piece, images, {});
   }
-  return writer.finish();
+  Manifest written = writer.finish();
+  writer.commit();
+  return written;
 }
 
 TEST_P(SliceFormats, LeavesOutTheBlankLayersBelowAndAboveThePart) {

@@ -53,6 +53,7 @@ class Stack : public testing::Test {
     }
     writer.add({0, 5}, std::move(images), {});
     writer.finish();
+    writer.commit();
   }
 
   [[nodiscard]] fs::path out(const std::string& name) const { return scratch_ / ("out/" + name); }
