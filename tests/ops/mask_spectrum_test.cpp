@@ -44,8 +44,9 @@ nlohmann::json spectrumOf(const std::vector<std::string>& mask, int slab_height 
     const ZRange core = intersection({z, z + slab_height}, schema.lattice.layers());
     sink->write({core, core, source->run(core)});
   }
-  EXPECT_FALSE(std::filesystem::exists(file));
   sink->finish();
+  EXPECT_FALSE(std::filesystem::exists(file));
+  sink->publish();
   return nlohmann::json::parse(std::ifstream(file));
 }
 

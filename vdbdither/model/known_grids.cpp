@@ -10,25 +10,23 @@ namespace {
 
 /// A grid that describes another one and is wrong once that one has changed.
 struct Described {
-  std::string_view name;  ///< of the grid, or its prefix
-  std::string_view of;    ///< the grid that it describes
+  std::string_view name;
+  std::string_view of;  ///< the grid that it describes
 };
 
-/// `Cd`, `Alpha` and `part` are not here: they are properties of the part, not of its surface.
-constexpr std::array<Described, 7> described_grids{{{normal_grid, surface_grid},
+/// `Cd`, `Alpha`, `part` and coverages are not here: they are properties of the part, not of its
+/// surface.
+constexpr std::array<Described, 6> described_grids{{{normal_grid, surface_grid},
                                                     {closest_grid, surface_grid},
                                                     {displaced_grid, surface_grid},
-                                                    {coverage_prefix, surface_grid},
                                                     {solid_grid, surface_grid},
                                                     {material_grid, solid_grid},
                                                     {printed_grid, solid_grid}}};
 
 /// The grid that `name` describes, or nothing.
 std::string_view describedBy(std::string_view name) {
-  for (const Described& entry : described_grids) {
-    if (entry.name == coverage_prefix ? name.starts_with(entry.name) : name == entry.name)
-      return entry.of;
-  }
+  for (const Described& entry : described_grids)
+    if (name == entry.name) return entry.of;
   return {};
 }
 
@@ -57,8 +55,10 @@ std::vector<std::string> outdatedGrids(const Schema& before, const Schema& after
     return then == before.grids.end() || then->second != now->second;
   };
   std::vector<std::string> names;
-  for (const auto& [name, grid] : before.grids)
+  for (const auto& [name, grid] : before.grids) {
+    if (name == normal_grid || name == closest_grid) continue;
     if (!after.grids.contains(name) && describesAny(name, changed)) names.push_back(name);
+  }
   return names;
 }
 

@@ -40,6 +40,7 @@ inline constexpr const char* part_count_key = "vdbdither:parts";
 Schema withoutOutdated(Schema schema, std::string_view changed);
 
 /// The names of the grids of `before` that `after` lacks because a grid that they describe changed.
+/// `N` and `closest` are left out: operators find both again where they need them.
 std::vector<std::string> outdatedGrids(const Schema& before, const Schema& after);
 
 }  // namespace vdbdither
