@@ -45,6 +45,7 @@ std::vector<std::string> textsOf(std::vector<std::pair<int, std::string>> by_lin
   std::stable_sort(by_line.begin(), by_line.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<std::string> texts;
+  texts.reserve(by_line.size());
   for (const auto& [line, message] : by_line)
     texts.push_back("line " + std::to_string(line) + ": " + message);
   return texts;

@@ -124,14 +124,14 @@ std::string ProfileParser::text(const Object& object, const std::string& key) {
   return "";
 }
 
-/// \param nameProblem  tells what is wrong with a name that is not empty
+/// \param name_problem  tells what is wrong with a name that is not empty
 std::string ProfileParser::name(
     const Object& object,
-    const std::function<std::optional<std::string>(std::string_view)>& nameProblem) {
+    const std::function<std::optional<std::string>(std::string_view)>& name_problem) {
   std::string name = text(object, "name");
   if (!object.has("name")) {
     problem(object, "name", "there is no name");
-  } else if (const auto wrong = nameProblem(name); wrong && !name.empty()) {
+  } else if (const auto wrong = name_problem(name); wrong && !name.empty()) {
     problem(object, "name", "its name " + *wrong);
   }
   return name;

@@ -51,7 +51,7 @@ class ProfileParser {
   void known(const Object& object, const std::vector<std::string>& keys);
   std::string text(const Object& object, const std::string& key);
   std::string name(const Object& object,
-                   const std::function<std::optional<std::string>(std::string_view)>& nameProblem);
+                   const std::function<std::optional<std::string>(std::string_view)>& name_problem);
   std::string word(const Object& object, const std::string& key,
                    const std::vector<std::string>& words, const std::string& otherwise);
   bool flag(const Object& object, const std::string& key);
