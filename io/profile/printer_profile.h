@@ -8,7 +8,7 @@
 
 namespace vdbdither {
 
-/// The least and the greatest spread of droplets along an axis that can be reckoned with.
+/// The minimum and maximum spread of droplets along an axis.
 inline constexpr double least_spread_mm = 0.001;
 inline constexpr double most_spread_mm = 1;
 
@@ -17,14 +17,14 @@ inline constexpr double most_spread_mm = 1;
 /// there are), DataError when it is malformed.
 PrinterProfile readPrinterProfile(const std::string& name_or_path);
 
-/// What is to be said of a profile: texts that begin with the line of the file, in its order.
+/// The findings about a profile. Each text begins with its line; texts are in the order of lines.
 struct ProfileFindings {
   std::vector<std::string> problems;  ///< a profile with any is refused
   std::vector<std::string> remarks;   ///< of a proper profile
 };
 
-/// Everything that is to be said of the profile called `name_or_path`. Throws UsageError when there
-/// is none.
+/// Returns the findings about the profile called `name_or_path`. Throws UsageError when there is
+/// none.
 ProfileFindings printerProfileFindings(const std::string& name_or_path);
 
 /// The profile in one line of JSON, as grids carry it under `vdbdither:printer`; and back.

@@ -251,7 +251,7 @@ void ProfileParser::slices(const Object& object) {
     const std::span<const std::string> known = containerNames();
     if (std::find(known.begin(), known.end(), name) == known.end()) {
       problem(object, "containers",
-              "containers: '" + name + "' is no format of slices; give " + alternatives(known));
+              "containers: '" + name + "' is not a slice format; give " + alternatives(known));
     }
   }
 }

@@ -11,29 +11,30 @@ namespace {
 /// A grid that describes another one and is wrong once that one has changed.
 struct Described {
   std::string_view name;
-  std::string_view of;  ///< the grid that it describes
+  std::string_view of;          ///< the grid that it describes
+  bool is_found_again = false;  ///< by every operator that needs it
 };
 
 /// `Cd`, `Alpha`, `part` and coverages are not here: they are properties of the part, not of its
 /// surface.
-constexpr std::array<Described, 6> described_grids{{{normal_grid, surface_grid},
-                                                    {closest_grid, surface_grid},
+constexpr std::array<Described, 6> described_grids{{{normal_grid, surface_grid, true},
+                                                    {closest_grid, surface_grid, true},
                                                     {displaced_grid, surface_grid},
                                                     {solid_grid, surface_grid},
                                                     {material_grid, solid_grid},
                                                     {printed_grid, solid_grid}}};
 
-/// The grid that `name` describes, or nothing.
-std::string_view describedBy(std::string_view name) {
+/// What the table says of the grid `name`; of others, that it describes none.
+Described descriptionOf(std::string_view name) {
   for (const Described& entry : described_grids)
-    if (name == entry.name) return entry.of;
+    if (name == entry.name) return entry;
   return {};
 }
 
 /// Whether a grid that `name` describes, directly or not, is one for which `holds` is true.
 template <typename Predicate>
 bool describesAny(std::string_view name, const Predicate& holds) {
-  for (name = describedBy(name); !name.empty(); name = describedBy(name))
+  for (name = descriptionOf(name).of; !name.empty(); name = descriptionOf(name).of)
     if (holds(name)) return true;
   return false;
 }
@@ -56,7 +57,7 @@ std::vector<std::string> outdatedGrids(const Schema& before, const Schema& after
   };
   std::vector<std::string> names;
   for (const auto& [name, grid] : before.grids) {
-    if (name == normal_grid || name == closest_grid) continue;
+    if (descriptionOf(name).is_found_again) continue;
     if (!after.grids.contains(name) && describesAny(name, changed)) names.push_back(name);
   }
   return names;

@@ -21,17 +21,12 @@ namespace {
 constexpr float no_sample = std::numeric_limits<float>::infinity();
 
 template <typename Lanes>
-[[gnu::always_inline]] inline void load(const float* from, Lanes& values) {
-  std::memcpy(&values, from, sizeof values);
-}
-
-template <typename Lanes>
 [[gnu::always_inline]] inline void findSlope(const float* at, int stride, float per_pitch,
                                              Lanes& slope) {
   Lanes below, centre, above;
-  load(at - stride, below);
-  load(at, centre);
-  load(at + stride, above);
+  loadLanes(at - stride, below);
+  loadLanes(at, centre);
+  loadLanes(at + stride, above);
   const auto has_below = (below < no_sample) & (below > -no_sample);
   const auto has_above = (above < no_sample) & (above > -no_sample);
   const Lanes rise = (has_above ? above : centre) - (has_below ? below : centre);

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 
 #include "ops/kernels/leaf/floats.h"
 
@@ -30,11 +29,6 @@ constexpr std::size_t by = 8;
 constexpr unsigned bitsPerColumn(bool flat) { return flat ? 2 : 8; }
 constexpr std::size_t foursPerWord(bool flat) { return 16 / bitsPerColumn(flat); }
 
-template <typename Lanes>
-[[gnu::always_inline]] inline void load(const float* from, Lanes& values) {
-  std::memcpy(&values, from, sizeof values);
-}
-
 }  // namespace
 
 /// The sum, compiled for each instruction set, number of hills and length of columns.
@@ -48,9 +42,9 @@ struct OpenSurroundings::Loops {
     constexpr std::size_t lanes = sizeof(Lanes) / sizeof(float);
     for (std::size_t n = 0; n < by; n += lanes) {
       Lanes apart2, depths, errors, w;
-      load(from_apart2 + n, apart2);
-      load(from_depths + n, depths);
-      load(from_errors + n, errors);
+      loadLanes(from_apart2 + n, apart2);
+      loadLanes(from_depths + n, depths);
+      loadLanes(from_errors + n, errors);
       const Lanes deeper = depth - depths;
       const Lanes x = apart2 - deeper * deeper;
       hills[0].weigh(x, w);

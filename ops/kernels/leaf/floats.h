@@ -4,7 +4,6 @@
 #include <emmintrin.h>
 #endif
 
-#include <cstdint>
 #include <cstring>
 
 namespace vdbdither {
@@ -16,8 +15,12 @@ using Floats = float __attribute__((vector_size(16)));
 using EightFloats = float __attribute__((vector_size(32)));
 /// Four doubles, in two registers of the baseline. They are passed by reference only, too.
 using Doubles = double __attribute__((vector_size(32)));
-/// The result of a comparison: all ones where it holds, else zero.
-using FloatBits = std::int32_t __attribute__((vector_size(16)));
+
+/// Sets `values`, Floats or EightFloats, to those from `from` on.
+template <typename Lanes>
+[[gnu::always_inline]] inline void loadLanes(const float* from, Lanes& values) {
+  std::memcpy(&values, from, sizeof values);
+}
 
 /// The four values from `from` on.
 inline Floats loadFloats(const float* from) {

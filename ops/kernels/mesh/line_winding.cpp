@@ -1,5 +1,6 @@
 #include "ops/kernels/mesh/line_winding.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -103,18 +104,16 @@ LineWinding::Sides LineWinding::ofBody(std::uint32_t body, const Line& line) con
   return sides;
 }
 
-template <class Visit>
-void LineWinding::visitBodies(const Line& line, const Visit& visit) const {
+LineWinding::Sides LineWinding::at(const Vec3d& p, const Vec3d& normal, double beside_mm,
+                                   std::span<const std::uint32_t> except) const {
+  const Line line(p, normal, beside_mm);
+  Sides sum;
   bodies_.visit([&](const BoxTree::Box& box) { return line.isIn(box); },
                 [&](std::uint32_t body) {
-                  visit(body, ofBody(body, line));
+                  if (!std::binary_search(except.begin(), except.end(), body))
+                    sum += ofBody(body, line);
                   return true;
                 });
-}
-
-LineWinding::Sides LineWinding::at(const Vec3d& p, const Vec3d& normal, double beside_mm) const {
-  Sides sum;
-  visitBodies(Line(p, normal, beside_mm), [&](std::uint32_t, const Sides& sides) { sum += sides; });
   return sum;
 }
 
@@ -122,15 +121,6 @@ LineWinding::Sides LineWinding::ofBody(std::uint32_t body, const Vec3d& p, const
                                        double beside_mm) const {
   const Line line(p, normal, beside_mm);
   return line.isIn(body_boxes_[body]) ? ofBody(body, line) : Sides();
-}
-
-std::vector<LineWinding::OfBody> LineWinding::ofBodies(const Vec3d& p, const Vec3d& normal,
-                                                       double beside_mm) const {
-  std::vector<OfBody> numbers;
-  visitBodies(Line(p, normal, beside_mm), [&](std::uint32_t body, const Sides& sides) {
-    if (sides.front != 0 || sides.back != 0) numbers.push_back({body, sides});
-  });
-  return numbers;
 }
 
 }  // namespace vdbdither

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <openvdb/Types.h>
@@ -30,34 +31,21 @@ class LineWinding {
     }
   };
 
-  /// The numbers of one body.
-  struct OfBody {
-    std::uint32_t body;
-    Sides sides;
-  };
-
   /// `boxes` are those of the triangles, or larger. `mesh` and `boxes` must outlive this.
   LineWinding(const Mesh& mesh, const MeshBodies& bodies, const std::vector<BoxTree::Box>& boxes);
 
   /// Returns the numbers at the distance `beside_mm` from a plane through p. `normal` is the unit
-  /// normal of the plane.
-  [[nodiscard]] Sides at(const openvdb::Vec3d& p, const openvdb::Vec3d& normal,
-                         double beside_mm) const;
+  /// normal of the plane. The bodies `except`, in rising order, do not count.
+  [[nodiscard]] Sides at(const openvdb::Vec3d& p, const openvdb::Vec3d& normal, double beside_mm,
+                         std::span<const std::uint32_t> except = {}) const;
 
   /// Returns the numbers of one body there.
   [[nodiscard]] Sides ofBody(std::uint32_t body, const openvdb::Vec3d& p,
                              const openvdb::Vec3d& normal, double beside_mm) const;
 
-  /// Returns the same for each body whose numbers there are not all zero.
-  [[nodiscard]] std::vector<OfBody> ofBodies(const openvdb::Vec3d& p, const openvdb::Vec3d& normal,
-                                             double beside_mm) const;
-
  private:
   class Line;
 
-  /// Calls visit(body, sides) for each body whose box holds the place.
-  template <class Visit>
-  void visitBodies(const Line& line, const Visit& visit) const;
   [[nodiscard]] Sides ofBody(std::uint32_t body, const Line& line) const;
 
   const Mesh& mesh_;

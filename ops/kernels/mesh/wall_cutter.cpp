@@ -217,9 +217,7 @@ WallCutter::Surface WallCutter::cut(const WallPiece& wall, Cuts cuts,
   Numbers numbers;
   for (const WallCut& each : cuts)
     if (numbers.open.empty() || each.body != numbers.open.back()) numbers.open.push_back(each.body);
-  for (const auto& [body, sides] : winding_.ofBodies(middleOf(wall), normal_, beside_mm))
-    if (!std::binary_search(numbers.open.begin(), numbers.open.end(), body))
-      numbers.settled += sides;
+  numbers.settled = winding_.at(middleOf(wall), normal_, beside_mm, numbers.open);
   return divide(wall, std::move(cuts), std::move(numbers), pieces);
 }
 

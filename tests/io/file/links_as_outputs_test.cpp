@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "io/file/staged_output.h"
+#include "tests/io/file/small_files.h"
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"
 
@@ -15,16 +16,12 @@ namespace {
 
 namespace fs = std::filesystem;
 using Kind = StagedOutput::Kind;
+using test::one;
+using test::put;
+using test::two;
 using testing::Pair;
 using testing::ThrowsMessage;
 using testing::UnorderedElementsAre;
-
-const std::vector<std::uint8_t> one = {1};
-const std::vector<std::uint8_t> two = {2, 2};
-
-void put(const fs::path& path, const std::vector<std::uint8_t>& bytes) {
-  writeFile(path, bytes, path);
-}
 
 TEST(LinksAsOutputs, ALinkStaysAndWhatItLeadsToIsReplaced) {
   const test::ScratchFolder scratch;
@@ -37,8 +34,7 @@ TEST(LinksAsOutputs, ALinkStaysAndWhatItLeadsToIsReplaced) {
   fs::create_symlink("deep/new", scratch / "dangling");
   for (const char* name : {"folder", "dangling"}) {
     StagedOutput::check(scratch / name, Kind::folder, true);
-    StagedOutput output(scratch / name, Kind::folder,
-                        [](const fs::path&) { return std::set<std::string>{"old"}; });
+    StagedOutput output(scratch / name, Kind::folder, test::ownFiles);
     output.write("new", two);
     output.commit();
   }

@@ -16,6 +16,7 @@
 #include <gtest/gtest.h>
 
 #include "io/file/staging_name.h"
+#include "tests/io/file/small_files.h"
 #include "tests/support/scratch_folder.h"
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/interrupt.h"
@@ -49,22 +50,16 @@ namespace {
 
 namespace fs = std::filesystem;
 using Kind = StagedOutput::Kind;
+using test::one;
+using test::ownFiles;
+using test::put;
+using test::two;
 using testing::EndsWith;
 using testing::IsEmpty;
 using testing::Pair;
 using testing::SizeIs;
 using testing::ThrowsMessage;
 using testing::UnorderedElementsAre;
-
-const std::vector<std::uint8_t> one = {1};
-const std::vector<std::uint8_t> two = {2, 2};
-
-void put(const fs::path& path, const std::vector<std::uint8_t>& bytes) {
-  writeFile(path, bytes, path);
-}
-
-/// An output that wrote `old` and `white/old` before.
-std::set<std::string> ownFiles(const fs::path& /*folder*/) { return {"old", "white/old"}; }
 
 /// Runs `function` in a process of its own, which ends without cleaning up.
 void inAnotherProcess(const std::function<void()>& function) {

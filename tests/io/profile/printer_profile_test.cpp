@@ -89,7 +89,7 @@ TEST(PrinterProfile, ContainersAreFormatsOfSlices) {
   for (const SliceFormat* format : sliceFormats()) formats.emplace_back(format->name);
   EXPECT_THAT(containerNames(), UnorderedElementsAreArray(formats));
   expectRefused(R"("containers": ["png", "nonsense"])",
-                "containers: 'nonsense' is no format of slices; give 3mf, exr, gcvf, objet, png, "
+                "containers: 'nonsense' is not a slice format; give 3mf, exr, gcvf, objet, png, "
                 "png1, png8, sl1, tiff, tiff1 or uvj");
 }
 
