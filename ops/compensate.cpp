@@ -42,7 +42,8 @@ class Compensate : public Filter {
     if (std::max({reach.x(), reach.y(), reach.z()}) > most_reach)
       throw UsageError("--spread: the droplets would reach over more than " +
                        std::to_string(most_reach) + " voxels; give a smaller spread");
-    checkBand(*surface, in.lattice);
+    // A feature is found with a voxel diameter of distances. The band stays what it is.
+    checkHolds(surface->background(), in.lattice.diagonalMm(), "'compensate' needs");
     compensation_ = DetailCompensation{in.lattice, *spread_mm_, steps_};
     Schema out = withoutOutdated(in, surface_grid);
     out.grids[surface_grid] = surface->copyGridWithNewTree();
@@ -64,18 +65,6 @@ class Compensate : public Filter {
 
  private:
   static constexpr int most_reach = 100;
-
-  /// The dither takes what it needs from the background, which stays what it is; a feature is found
-  /// with a voxel diameter.
-  static void checkBand(const FloatGrid& surface, const Lattice& lattice) {
-    const double diagonal_mm = lattice.diagonalMm();
-    const double band_mm = double{surface.background()};
-    if (band_mm * (1 + 1e-6) >= diagonal_mm) return;
-    const auto text = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4); };
-    throw DataError("grid 'surface' holds distances up to " + text(band_mm) +
-                    " mm, and 'compensate' needs a voxel's diagonal, " + text(diagonal_mm) +
-                    " mm: mesh2sdf --band 1");
-  }
 
   std::optional<Vec3d> spread_mm_;
   int steps_ = 2;

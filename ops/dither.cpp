@@ -14,6 +14,7 @@
 #include "ops/kernels/dither/error_diffusion.h"
 #include "ops/kernels/dither/refinement.h"
 #include "ops/kernels/dither/shape_dither.h"
+#include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/leaf/leaf_bits.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/mask/mask_tile.h"
@@ -141,13 +142,13 @@ class Dither : public Filter {
       const bool guarded = guard_ == Guard::walls;
       diffusion_.emplace(pitch_mm, *spread_mm_, guarded);
       if (sweeps_ > 0) refinement_.emplace(pitch_mm, *spread_mm_, guarded, sweeps_);
-      checkBand(surface->background(), pitch_mm.length(), "--method diffusion");
+      checkHolds(surface->background(), pitch_mm.length(), "'dither' needs");
     } else {
       planMask(pitch_mm);
       if (dither_.amplitude != 0)
-        checkBand(surface->background(),
-                  std::max(dither_.largestDisplacementMm(), pitch_mm.length()),
-                  "--amplitude " + shortestText(dither_.amplitude));
+        checkHolds(surface->background(),
+                   std::max(dither_.largestDisplacementMm(), pitch_mm.length()),
+                   "--amplitude " + shortestText(dither_.amplitude) + " needs");
     }
 
     Schema out = withoutOutdated(in, solid_grid);
@@ -298,14 +299,6 @@ class Dither : public Filter {
     };
     return ThresholdMask(*cachedMask(*emptyMask(settings), make,
                                      [this](const std::string& text) { report().warn(text); }));
-  }
-
-  /// The distances must reach as far as the displacements, and the surface voxels must have theirs.
-  static void checkBand(double band_mm, double needed_mm, const std::string& what) {
-    if (band_mm * (1 + 1e-6) >= needed_mm) return;
-    const auto text = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4) + " mm"; };
-    throw DataError("grid 'surface' holds distances up to " + text(band_mm) + ", and " + what +
-                    " on this lattice needs " + text(needed_mm));
   }
 
   Preset preset_ = Preset::best;

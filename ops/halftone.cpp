@@ -70,8 +70,9 @@ class HalftoneFilter : public Filter {
       separation_ = separationInto(set_);
       if (has_opacity_ && !set_.clear)
         report().warn("no ink is clear: 'Alpha' is ignored and all is printed opaque");
-    } else if (!inks_.icc.empty()) {
-      throw UsageError("--icc: coverages are not separated again; leave it out");
+    } else if (!inks_.icc.empty() || !inks_.mixing_given.empty()) {
+      throw UsageError((inks_.icc.empty() ? inks_.mixing_given : "--icc") +
+                       ": coverages are not separated again; leave it out");
     }
     if (!rest_.empty() && columns_.empty())
       throw UsageError("--rest: colours have no rest; leave it out");

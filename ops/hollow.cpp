@@ -72,16 +72,7 @@ class Hollow : public Filter {
   void planBand(const FloatGrid& surface) {
     const double held_mm = heldBandMm(surface);
     const double needed_mm = thickness_mm_ + lattice_.diagonalMm();
-    // A band of exactly the width needed, rounded to single precision.
-    constexpr double tolerance = 1 + 1e-6;
-    if (held_mm * tolerance < needed_mm) {
-      const double asked_mm = std::ceil(needed_mm * 1e3) / 1e3;
-      throw DataError("grid 'surface' holds distances up to " +
-                      shortestText(std::floor(held_mm * 1e4 + 0.01) / 1e4) +
-                      " mm everywhere, and a shell of " + shortestText(thickness_mm_) +
-                      " mm needs " + shortestText(asked_mm) + " mm: mesh2sdf --band " +
-                      shortestText(asked_mm) + "mm");
-    }
+    checkHolds(held_mm, needed_mm, "a shell of " + shortestText(thickness_mm_) + " mm needs");
     background_mm_ = static_cast<float>(std::max(held_mm - thickness_mm_, lattice_.diagonalMm()));
   }
 

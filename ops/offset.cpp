@@ -69,7 +69,10 @@ class Offset : public Filter {
     offset_.held_mm = heldBandMm(*surface);
     if (!map_.empty()) offset_.map = heightMap(in.lattice);
     if (!grid_.empty()) findGrid<FloatGrid>(in.grids, grid_);
-    checkBand();
+    // What is left of the band must do for the dither.
+    checkHolds(
+        offset_.held_mm, offset_.maximumMm() + offset_.lattice.diagonalMm(),
+        "offsets up to " + shortestText(std::round(offset_.maximumMm() * 1e4) / 1e4) + " mm need");
 
     Schema out = withoutOutdated(in, surface_grid);
     out.grids[surface_grid] = emptySurface(*surface, offset_.backgroundMm());
@@ -112,19 +115,6 @@ class Offset : public Filter {
     } catch (const DataError& error) {
       throw DataError(std::string("--map: ") + error.what());
     }
-  }
-
-  /// What is left of the band must do for the dither.
-  void checkBand() const {
-    const double needed_mm = offset_.maximumMm() + offset_.lattice.diagonalMm();
-    if (offset_.held_mm * (1 + 1e-6) >= needed_mm) return;
-    const double asked_mm = std::ceil(needed_mm * 1e3) / 1e3;
-    throw DataError("grid 'surface' holds distances up to " +
-                    shortestText(std::floor(offset_.held_mm * 1e4 + 0.01) / 1e4) +
-                    " mm everywhere, and offsets up to " +
-                    shortestText(std::round(offset_.maximumMm() * 1e4) / 1e4) + " mm need " +
-                    shortestText(asked_mm) + " mm: mesh2sdf --band " + shortestText(asked_mm) +
-                    "mm");
   }
 
   std::string map_;

@@ -7,6 +7,7 @@
 
 #include "io/profile/printer_profile.h"
 #include "ops/kernels/dither/refinement.h"
+#include "ops/kernels/leaf/held_band.h"
 #include "ops/kernels/leaf/solid.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/model/errors.h"
@@ -42,7 +43,7 @@ class Refine : public Filter {
     if (has_normals_) findGrid<openvdb::Vec3SGrid>(in.grids, normal_grid);
     if (!spread_mm_) spread_mm_ = pointSpreadMmOf(in);
     const Vec3d& pitch_mm = in.lattice.pitch_mm;
-    checkBand(surface->background(), pitch_mm.length());
+    checkHolds(surface->background(), pitch_mm.length(), "'refine' needs");
     refinement_.emplace(pitch_mm, *spread_mm_, guard_ == Guard::walls, sweeps_);
     Schema out = withoutOutdated(in, solid_grid);
     out.grids[solid_grid] = makeSolidGrid(surface->transform());
@@ -69,13 +70,6 @@ class Refine : public Filter {
   }
 
  private:
-  static void checkBand(double band_mm, double needed_mm) {
-    if (band_mm * (1 + 1e-6) >= needed_mm) return;
-    const auto text = [](double mm) { return shortestText(std::round(mm * 1e4) / 1e4) + " mm"; };
-    throw DataError("grid 'surface' holds distances up to " + text(band_mm) +
-                    ", and refine needs " + text(needed_mm) + " on this lattice");
-  }
-
   int sweeps_ = 2;
   Guard guard_{};
   std::optional<Vec3d> spread_mm_;

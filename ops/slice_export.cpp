@@ -76,7 +76,13 @@ class SliceExport : public Sink {
                  }) + ": #rrggbb, or r,g,b,a from 0 to 255");
     options.file("page", page_name_, "FILE.html",
                  "Writes a page to look through the slices too, as preview does");
-    for (const SliceFormat* format : sliceFormats()) encoders_[format]->declare(options);
+    for (const SliceFormat* format : sliceFormats()) {
+      const std::size_t before = options.all().size();
+      encoders_[format]->declare(options);
+      const std::size_t count = options.all().size() - before;
+      options.noteGiven(option_given_[format], count);
+      options.onlyIf([this, format] { return format == format_; }, count);
+    }
     overwrite_.declare(options, "the stack");
   }
 
@@ -216,6 +222,11 @@ class SliceExport : public Sink {
                          " prescribes the names of its files; leave it out");
       }
       names_ = *format_->names;
+    }
+    for (const auto& [other, option] : option_given_) {
+      if (other != format_ && !option.empty())
+        throw UsageError(option + ": belongs to " + std::string(other->name) +
+                         ", and the slices are " + format_name_ + "; leave it out");
     }
     encoder_ = encoders_.at(format_).get();
   }
@@ -435,7 +446,7 @@ class SliceExport : public Sink {
   std::filesystem::path target_;  ///< `folder_`, or that of a piece
   StackPart part_ = StackPart::whole;
   std::string format_name_ = "png";
-  std::string background_ = "0,0,0,255";
+  std::string background_ = usual_background;
   SliceNames names_{"slice_", 5, 0};
   FrameOptions frame_;
   bool keep_blank_ = false;
@@ -446,6 +457,8 @@ class SliceExport : public Sink {
   std::string page_name_;
   OverwriteOption overwrite_;
   std::map<const SliceFormat*, std::unique_ptr<SliceEncoder>> encoders_;
+  std::map<const SliceFormat*, std::string>
+      option_given_;  ///< one of the encoder's, if it is given
 
   Schema schema_;
   const SliceFormat* format_ = nullptr;

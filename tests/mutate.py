@@ -9,10 +9,10 @@ of them tells:
 1. It is built. One that does not compile, or that too many sources include (--most-sources), is left out of the sample.
 2. The suites that mirror its folder run (tests/kernels/dither for ops/kernels/dither), and the tests of the program that are named
    like its file. A failure, a crash or a test that hangs catches it.
-3. With --tests all, all other tests run, except those that tests/support/coverage_unsuited.txt names.
-4. The sample chains of tests/bench/digests.py run. A mutant that no test has caught and that changes a byte of what they write is a
-   survivor: an output is wrong, and no test says so. One that changes no byte is set apart as `no effect`: it is equivalent, or in code
-   that the chains do not reach. These are listed, to be looked at, and are not part of the share.
+3. The sample chains of tests/bench/digests.py run. A mutant that changes no byte of what they write is set apart as `no effect`: it is
+   equivalent, or in code that the chains do not reach. These are listed, to be looked at, and are not part of the share.
+4. With --tests all, all other tests run, except those that tests/support/coverage_unsuited.txt names. A mutant that no test has
+   caught is a survivor: an output is wrong, and no test says so.
 
 The share is caught / (caught + survived). Each result is also a line of JSON in build/mutants/results.jsonl.
 """
@@ -185,9 +185,11 @@ class Mutants:
             code = run(command, seconds, cwd=HOME)
             if code != 0:
                 return "caught", "it hangs" if code is None else pathlib.Path(command[0]).name
+        if not self.changes_an_output():
+            return "no effect", ""
         if self.given.tests == "all" and (not self.build(["all"]) or run(self.ctest("."), 7200) != 0):
             return "caught", "all tests"
-        return ("survived" if self.changes_an_output() else "no effect"), ""
+        return "survived", ""
 
     def judge(self, name, number, new):
         path = TREE / name

@@ -97,9 +97,11 @@ InkSet inkSetOf(const InkOptions& options, const Schema& in, const std::vector<M
   set.kubelka_munk = printer.kubelka_munk;
   if (set.kubelka_munk) takeCoefficients(known, set);
   if (!options.icc.empty()) {
+    if (!options.mixing_given.empty())
+      throw UsageError(options.mixing_given + ": the profile of --icc says it; leave it out");
     set.table = readIccCoverages(options, set);
-  } else if (!options.channels.empty()) {
-    throw UsageError("--channels: only a profile of --icc has channels; leave it out");
+  } else if (!options.icc_given.empty()) {
+    throw UsageError(options.icc_given + ": belongs to --icc; leave it out, or give a profile");
   }
   return set;
 }

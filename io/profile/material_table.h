@@ -25,6 +25,9 @@ MaterialTable materialTableFromJson(const std::string& text);
 /// UsageError.
 std::array<std::uint8_t, 4> parseColour(std::string_view text);
 
+/// The colour of empty voxels in slices, unless the user chooses another.
+inline constexpr const char* usual_background = "0,0,0,255";
+
 /// Whether two names of materials are the same, case aside.
 bool sameName(std::string_view a, std::string_view b);
 

@@ -327,19 +327,23 @@ void ProfileParser::material(const Object& entry) {
                    : "differs from '" + other->name + "' by upper and lower case only"));
 }
 
-/// Remarks that the material has the colour of one before it.
+/// Remarks that the material has the colour of empty voxels, or of a material before it.
 void ProfileParser::remarkColour(const Object& entry, const Material& material) {
+  const auto remark = [&](const std::string& text) {
+    std::vector<std::string> path = entry.path;
+    path.emplace_back("rgba");
+    remarks_.push_back({std::move(path), entry.prefix + "'" + material.name + "' has " + text});
+  };
+  if (material.rgba == parseColour(usual_background))
+    remark("the colour of empty voxels; give slice-export another --background");
   const std::span<const Material> others(profile_.materials.data(), profile_.materials.size() - 1);
   const auto same = std::find_if(others.begin(), others.end(), [&](const Material& other) {
     return other.rgba == material.rgba;
   });
   if (same == others.end()) return;
-  std::vector<std::string> path = entry.path;
-  path.emplace_back("rgba");
-  remarks_.push_back(
-      {std::move(path), entry.prefix + "'" + material.name + "' has the colour of '" + same->name +
-                            "', so that formats that tell materials apart by colour, such as png "
-                            "and gcvf, refuse jobs of both"});
+  remark("the colour of '" + same->name +
+         "', so that formats that tell materials apart by colour, such as png and gcvf, refuse "
+         "jobs of both");
 }
 
 void ProfileParser::appearance(const Object& entry, Material& material) {

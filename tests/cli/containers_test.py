@@ -261,6 +261,8 @@ class Containers(ProgramTest):
         refuse(shape, "a.3mf")
         refuse(shape, "a.3mf", "--3mf-level-set", "--3mf-mesh", self.made / "part.stl")
         refuse("--prefix: gcvf prescribes the names of its files; leave it out", "a.gcvf", "--prefix", "p")
+        refuse("--sl1-grey: belongs to sl1, and the slices are png; leave it out", "out", "--sl1-grey")
+        refuse("--3mf-level-set: belongs to 3mf, and the slices are gcvf; leave it out", "a.gcvf", "--3mf-level-set")
 
 
 if __name__ == "__main__":

@@ -66,7 +66,7 @@ class History(ProgramTest):
             "materials": [{"name": name, "rgba": rgba} for name, rgba in (("white", [255, 255, 255, 255]), ("black", [0, 0, 0, 255]))]}))
         self.succeed("mesh2sdf", "part.obj", "--printer", "jet.json", "--colour", "!", "dither", "!", "material-assign", "-o", "x.vdb")
         self.assertEqual(self.arguments("x.vdb", "halftone"),
-                         "--black 0.5 --white media --intent relative --black-point compensated --core white --mask blue --size 0,0,0 --seed 1")
+                         "--black 0.5 --white media --core white --mask blue --size 0,0,0 --seed 1")
         self.assertEqual([line.split()[0] for line in self.history("x.vdb")], ["mesh2sdf", "dither", "halftone"])
         self.assert_runs_again("x.vdb")
 

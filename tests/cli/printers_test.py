@@ -236,6 +236,12 @@ class Printers(ProgramTest):
         self.assertEqual(json.loads(self.succeed("printers", "check", "odd.json", "--json")),
                          {"profile": "odd.json", "problems": [], "remarks": [remark]})
 
+    def test_check_remarks_a_material_of_the_colour_of_empty_voxels(self):
+        (self.folder / "odd.json").write_text("""{"name": "odd", "pitch_mm": [1, 1, 1], "materials": [
+            {"name": "k", "rgba": [0, 0, 0, 255]}]}""")
+        remark = "line 2: material 1: 'k' has the colour of empty voxels; give slice-export another --background"
+        self.assertEqual(self.succeed("printers", "check", "odd.json").decode(), f"'odd.json' is a proper profile\n{remark}\n")
+
     def test_every_format_of_slices_may_be_a_container(self):
         formats = re.search(r"--format ([\w|]+)", self.succeed("slice-export", "--help").decode())
         self.assertIsNotNone(formats, self.succeed("slice-export", "--help").decode())

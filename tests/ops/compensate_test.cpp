@@ -93,8 +93,8 @@ TEST(Compensate, RefusesASpreadOfNothing) {
 TEST(Compensate, RefusesABandWithoutAVoxelsDiagonal) {
   EXPECT_THAT(test::planning("compensate", bar(0.05), {}),
               ThrowsMessage<DataError>(HasSubstr("holds distances up to 0.05 mm, and 'compensate' "
-                                                 "needs a voxel's diagonal, 0.0965 mm: mesh2sdf "
-                                                 "--band 1")));
+                                                 "needs 0.0965 mm: widen --band of mesh2sdf or "
+                                                 "resample by 0.047 mm")));
 }
 
 }  // namespace

@@ -269,13 +269,13 @@ TEST(Dither, RefusesASurfaceThatDoesNotReachFarEnough) {
         test::filterCalled("dither", {"--mask", "white", "--preset", "paper"})->plan(thin);
       },
       ThrowsMessage<DataError>(
-          "grid 'surface' holds distances up to 0.09 mm, and --amplitude 4 on this "
-          "lattice needs 0.0965 mm"));
+          "grid 'surface' holds distances up to 0.09 mm, and --amplitude 4 "
+          "needs 0.0965 mm: widen --band of mesh2sdf or resample by 0.007 mm"));
   EXPECT_THAT(
       [&] {
         test::filterCalled("dither", {"--mask", "white"})->plan(thin);
       },
-      ThrowsMessage<DataError>(HasSubstr("--amplitude 2 on this lattice needs 0.0965 mm")));
+      ThrowsMessage<DataError>(HasSubstr("--amplitude 2 needs 0.0965 mm")));
   EXPECT_NO_THROW(test::filterCalled("dither", {"--mask", "none"})->plan(thin));
 }
 

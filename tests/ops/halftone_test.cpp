@@ -115,7 +115,13 @@ TEST(Halftone, RefusesWhatItCannotDo) {
   expectRefusal("halftone", {"--icc", "inks.icc"}, schemaWith({"coverage_VeroCyan"}), "--icc: ");
   expectRefusal("halftone", {"--icc", "no such.icc"}, colours, "--icc: no such file 'no such.icc'");
   expectRefusal("halftone", {"--channels", "cyan"}, colours,
-                "--channels: only a profile of --icc has channels; leave it out");
+                "--channels: belongs to --icc; leave it out, or give a profile");
+  expectRefusal("halftone", {"--intent", "saturation"}, colours, "--intent: belongs to --icc; ");
+  expectRefusal("separate", {"--black-point", "kept"}, colours, "--black-point: belongs to --icc");
+  expectRefusal("halftone", {"--icc", "inks.icc", "--black", "0"}, colours,
+                "--black: the profile of --icc says it; leave it out");
+  expectRefusal("halftone", {"--white", "absolute"}, schemaWith({"coverage_VeroCyan"}),
+                "--white: coverages are not separated again; leave it out");
   expectRefusal("halftone", {"--mask", "white"}, colours,
                 "--size: only --mask blue has it; leave it out");
   Schema bare = colours;

@@ -23,10 +23,11 @@ auto planning(const Schema& schema, const std::vector<std::string>& arguments) {
 }
 
 TEST(Hollow, SaysWhichBandItNeeds) {
-  EXPECT_THAT(planning(ballWithBand(0.29), {"--thickness", "0.2"}),
-              ThrowsMessage<DataError>(
-                  "grid 'surface' holds distances up to 0.29 mm everywhere, and a shell of 0.2 mm "
-                  "needs 0.297 mm: mesh2sdf --band 0.297mm"));
+  EXPECT_THAT(
+      planning(ballWithBand(0.29), {"--thickness", "0.2"}),
+      ThrowsMessage<DataError>(
+          "grid 'surface' holds distances up to 0.29 mm, and a shell of 0.2 mm needs 0.2965 mm: "
+          "widen --band of mesh2sdf or resample by 0.007 mm"));
   EXPECT_NO_THROW(planning(ballWithBand(0.297), {"--thickness", "0.2"})());
 }
 
@@ -34,7 +35,7 @@ TEST(Hollow, ABandInDiametersCountsByItsLeast) {
   const auto surface = FloatGrid::create(0.3F);
   setHeldBandMm(*surface, 0.066);
   EXPECT_THAT(planning(test::schemaOf(lattice, {{"surface", surface}}), {"--thickness", "0.1"}),
-              ThrowsMessage<DataError>(HasSubstr("up to 0.066 mm everywhere")));
+              ThrowsMessage<DataError>(HasSubstr("up to 0.066 mm, and a shell")));
 }
 
 TEST(Hollow, LeavesTheDitherItsBandAndDropsWhatIsOfTheOldSurface) {

@@ -47,11 +47,10 @@ class OffsetMap : public testing::Test {
 
 TEST(Offset, SaysWhichBandItNeeds) {
   for (const char* by : {"0.2mm", "-0.2mm"}) {
-    EXPECT_THAT(
-        planning(ballWithBand(0.29), {"--by", by}),
-        ThrowsMessage<DataError>(
-            "grid 'surface' holds distances up to 0.29 mm everywhere, and offsets up to 0.2 "
-            "mm need 0.297 mm: mesh2sdf --band 0.297mm"));
+    EXPECT_THAT(planning(ballWithBand(0.29), {"--by", by}),
+                ThrowsMessage<DataError>("grid 'surface' holds distances up to 0.29 mm, and "
+                                         "offsets up to 0.2 mm need 0.2965 mm: "
+                                         "widen --band of mesh2sdf or resample by 0.007 mm"));
   }
   EXPECT_NO_THROW(planning(ballWithBand(0.297), {"--by", "0.2mm"})());
 }

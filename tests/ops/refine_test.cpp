@@ -51,8 +51,9 @@ TEST(Refine, NeedsASurfaceASolidAndABand) {
   const Schema thin = test::schemaOf(
       mimaki, {{"surface", FloatGrid::create(0.09F)}, {"solid", BoolGrid::create(false)}});
   EXPECT_THAT([&] { test::filterCalled("refine")->plan(thin); },
-              ThrowsMessage<DataError>("grid 'surface' holds distances up to 0.09 mm, and refine "
-                                       "needs 0.0965 mm on this lattice"));
+              ThrowsMessage<DataError>("grid 'surface' holds distances up to 0.09 mm, and "
+                                       "'refine' needs 0.0965 mm: widen --band of mesh2sdf or "
+                                       "resample by 0.007 mm"));
   EXPECT_THROW(test::filterCalled("refine", {"--sweeps", "0"}), UsageError);
 }
 

@@ -78,7 +78,7 @@ TEST(Soften, ErasesTheGridsThatDescribePointsOfTheSurface) {
 
 TEST(Soften, RefusesABandTooNarrowForTheDither) {
   EXPECT_THAT([] { madeSoften()->plan(boxShape(0.15)); },
-              ThrowsMessage<DataError>(HasSubstr("use mesh2sdf --band 0.18")));
+              ThrowsMessage<DataError>(HasSubstr("'soften' needs 0.18")));
 }
 
 }  // namespace

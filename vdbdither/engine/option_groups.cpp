@@ -81,9 +81,11 @@ void InkOptions::declare(Options& options) {
       "opaque");
   options.number(
       "black", black, {0, 1},
-      "Where colours can be mixed with more or less black: 0 takes as little as possible, "
-      "1 as much");
+      "Where colours can be mixed with more or less black, without --icc: 0 takes as little as "
+      "possible, 1 as much");
   options.choice("white", white, whites, "What white is, without --icc");
+  options.noteGiven(mixing_given, 2);
+  options.onlyIf([this] { return icc.empty(); }, 2);
   options.file(
       "icc", icc, "FILE.icc",
       "ICC output profile that says which inks make up a colour, in place of the mixing of "
@@ -93,6 +95,8 @@ void InkOptions::declare(Options& options) {
                "the channels");
   options.choice("intent", intent, intents, "Rendering intent of --icc");
   options.choice("black-point", black_point, black_points, "Black of --icc with --intent relative");
+  options.noteGiven(icc_given, 3);
+  options.onlyIf([this] { return !icc.empty(); }, 3);
 }
 
 void OverwriteOption::declare(Options& options, const std::string& output) {

@@ -442,20 +442,20 @@ void Options::parse(std::span<const std::string> arguments, const Options& commo
   }
 }
 
-void Options::noteGiven(std::string& given) {
-  Option& option = options_.back();
-  option.set = [&given, shown = option.shown(),
-                set = std::move(option.set)](const std::string& text) {
-    set(text);
-    given = shown;
-  };
+void Options::noteGiven(std::string& given, std::size_t count) {
+  for (Option& option : std::span(options_).last(count)) {
+    option.set = [&given, shown = option.shown(),
+                  set = std::move(option.set)](const std::string& text) {
+      set(text);
+      given = shown;
+    };
+  }
 }
 
-void Options::onlyIf(std::function<bool()> applies) {
-  Option& option = options_.back();
-  option.get = [applies = std::move(applies), get = std::move(option.get)] {
-    return applies() ? get() : Texts{};
-  };
+void Options::onlyIf(const std::function<bool()>& applies, std::size_t count) {
+  for (Option& option : std::span(options_).last(count)) {
+    option.get = [applies, get = std::move(option.get)] { return applies() ? get() : Texts{}; };
+  }
 }
 
 std::string Options::canonical() const {

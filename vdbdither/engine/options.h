@@ -170,10 +170,12 @@ class Options {
     options_.back().required = true;
     options_.back().fallback.clear();
   }
-  /// Makes `given` the name of the option declared last, as messages call it, when it is given.
-  void noteGiven(std::string& given);
-  /// Leaves the option declared last without a value, in the history line too, unless `applies()`.
-  void onlyIf(std::function<bool()> applies);
+  /// Makes `given` the name of one of the `count` options declared last, as messages call it, when
+  /// it is given.
+  void noteGiven(std::string& given, std::size_t count = 1);
+  /// Leaves the `count` options declared last without a value, in the history line too, unless
+  /// `applies()`.
+  void onlyIf(const std::function<bool()>& applies, std::size_t count = 1);
   /// Says which words the text declared last accepts besides its value, and what they do.
   void words(std::vector<Word> words) { options_.back().words = std::move(words); }
   /// Says what completes a value of the option declared last.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <string>
 
 #include "vdbdither/model/openvdb.h"
 
@@ -25,5 +26,9 @@ inline double heldBandMm(const openvdb::FloatGrid& surface) {
   const auto stated = surface.getMetadata<openvdb::DoubleMetadata>(held_band_key);
   return stated ? stated->value() : double{surface.background()};
 }
+
+/// Throws a DataError with the missing width, unless distances up to `held_mm` reach as far as
+/// `needed_mm`. `who_needs` goes before the width: "a shell of 0.2 mm needs".
+void checkHolds(double held_mm, double needed_mm, const std::string& who_needs);
 
 }  // namespace vdbdither
