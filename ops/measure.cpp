@@ -289,10 +289,10 @@ class SurfaceMeasurement {
   }
 
   void writeMap(const Mesh& mesh, const SurfaceErrors& errors, double range_mm) {
-    VertexExtras extras{true, true,
-                        "quality is the error in mm; blue is -" + shortestText(range_mm) +
-                            ", grey 0, red " + shortestText(range_mm)};
-    map_.emplace(map_file_, extras);
+    const VertexExtras extras{true, true,
+                              "quality is the error in mm; blue is -" + shortestText(range_mm) +
+                                  ", grey 0, red " + shortestText(range_mm)};
+    map_.emplace(map_file_, MeshEncoding{extras, {}});
     std::vector<std::array<std::uint8_t, 3>> colours;
     std::vector<float> qualities;
     for (std::size_t vertex = 0; vertex < errors.vertices; ++vertex) {

@@ -30,13 +30,17 @@ using Rgb = std::array<std::uint8_t, 3>;
 class MeshExport : public Sink {
  public:
   void declare(Options& options) override {
-    options.positional("file", file_,
-                       "Mesh to write, its coordinates exact as floats: " + meshEndings());
+    options.positional("file", file_, "Mesh to write, its coordinates floats: " + meshEndings());
     surface_grid_.declare(options);
     options.length("level", level_mm_, {-1000, 1000},
                    "Level of the surface, in place of 0 in a distance (mm) or 0.5 in a share of "
                    "material");
     smoothing_.declare(options);
+    options.length("draco", draco_mm_, {0, 10},
+                   "Compresses " + meshEndings([](const MeshFormat& format) {
+                     return format.takes_draco;
+                   }) + " by Draco: coordinates are off by up to this length, and of 0 exact",
+                   {"none", "Exact coordinates, and .glb without Draco"});
     overwrite_.declare(options, "the file");
   }
 
@@ -46,6 +50,10 @@ class MeshExport : public Sink {
     name_ = chosenSurfaceGrid(there, surface_grid_.grid);
     surface_.emplace(in.lattice, *in.grids.at(name_), level_mm_);
     MeshWriter::check(file_, overwrite_.overwrite);
+    if (draco_mm_ && !meshFormatNamedBy(file_)->takes_draco)
+      throw UsageError("--draco: '" + file_ + "' is not compressed; name a " +
+                       meshEndings([](const MeshFormat& format) { return format.takes_draco; }) +
+                       " file, or leave it out");
     leaves_ = in.footprint.at_surface;
     if (in.grids.contains(colour_grid) && meshFormatNamedBy(file_)->holds_extras) {
       findGrid<openvdb::Vec3SGrid>(in.grids, colour_grid);
@@ -102,9 +110,9 @@ class MeshExport : public Sink {
 
   void begin() {
     if (writer_) return;
-    VertexExtras extras;
-    extras.colour = nearest_.has_value();
-    writer_ = std::make_unique<MeshWriter>(file_, extras);
+    MeshEncoding how{.extras = {}, .draco_mm = draco_mm_};
+    how.extras.colour = nearest_.has_value();
+    writer_ = std::make_unique<MeshWriter>(file_, how);
   }
 
   void take(const SurfacePiece& piece) {
@@ -133,6 +141,7 @@ class MeshExport : public Sink {
   std::string file_;
   SurfaceGridOption surface_grid_;
   std::optional<double> level_mm_;
+  std::optional<double> draco_mm_;
   SmoothingOptions smoothing_;
   OverwriteOption overwrite_;
 

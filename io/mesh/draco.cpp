@@ -4,19 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <draco/compression/expert_encode.h>
-#include <draco/core/encoder_buffer.h>
-#include <draco/mesh/mesh.h>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "io/image/srgb.h"
+#include "io/mesh/draco_encoding.h"
 #include "io/mesh/draco_mesh.h"
 #include "io/mesh/mesh_format.h"
-#include "vdbdither/model/errors.h"
-#include "vdbdither/model/interrupt.h"
 
 namespace vdbdither {
 
@@ -126,11 +122,11 @@ MeshMatch matchDraco(const MeshFile& file) {
   return file.head().starts_with("DRACO") ? MeshMatch::signature : MeshMatch::none;
 }
 
-/// Keeps the mesh: Draco encodes it as a whole. Nothing is quantized, and the order stays.
+/// Keeps the mesh: Draco encodes it as a whole.
 class DracoEncoder : public MeshEncoder {
  public:
-  DracoEncoder(const std::filesystem::path& path, const VertexExtras& extras)
-      : MeshEncoder(path), extras_(extras) {}
+  DracoEncoder(const std::filesystem::path& path, const MeshEncoding& how)
+      : MeshEncoder(path), extras_(how.extras), encoding_(how.draco_mm.value_or(0)) {}
 
   void vertex(const MeshVertex& vertex) override {
     positions_.push_back(vertex.position);
@@ -138,43 +134,19 @@ class DracoEncoder : public MeshEncoder {
     if (extras_.quality) qualities_.push_back(vertex.quality);
   }
 
-  void triangle(const Mesh::Triangle& triangle) override {
-    mesh_.AddFace({draco::PointIndex(triangle[0]), draco::PointIndex(triangle[1]),
-                   draco::PointIndex(triangle[2])});
-  }
+  void triangle(const Mesh::Triangle& triangle) override { encoding_.triangle(triangle); }
 
  protected:
   void finish(std::uint64_t vertices, std::uint64_t /*triangles*/) override {
-    mesh_.set_num_points(static_cast<std::uint32_t>(vertices));
-    addAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32, positions_);
-    addAttribute(draco::GeometryAttribute::COLOR, 3, draco::DT_UINT8, colours_);
-    addAttribute(draco::GeometryAttribute::GENERIC, 1, draco::DT_FLOAT32, qualities_);
-    throwIfInterrupted();
-    draco::ExpertEncoder encoder(mesh_);
-    encoder.SetEncodingMethod(draco::MESH_SEQUENTIAL_ENCODING);
-    encoder.options().SetGlobalBool("compress_connectivity", true);
-    draco::EncoderBuffer buffer;
-    if (!encoder.EncodeToBuffer(&buffer).ok())
-      throw DataError("the mesh cannot be encoded by Draco; write another format");
-    throwIfInterrupted();
-    file_.append(buffer.data(), buffer.size());
+    encoding_.positions(std::move(positions_));
+    if (extras_.colour) encoding_.colours(std::exchange(colours_, {}));
+    if (extras_.quality) encoding_.numbers(std::exchange(qualities_, {}));
+    file_.append(encoding_.encode(vertices));
   }
 
  private:
-  template <class Value>
-  void addAttribute(draco::GeometryAttribute::Type type, int components, draco::DataType data_type,
-                    std::vector<Value>& values) {
-    if (values.empty()) return;
-    auto attribute = std::make_unique<draco::PointAttribute>();
-    attribute->Init(type, static_cast<std::int8_t>(components), data_type,
-                    type == draco::GeometryAttribute::COLOR, values.size());
-    attribute->buffer()->Write(0, values.data(), values.size() * sizeof(Value));
-    mesh_.AddAttribute(std::move(attribute));
-    values = {};
-  }
-
   VertexExtras extras_;
-  draco::Mesh mesh_;
+  DracoEncoding encoding_;
   std::vector<openvdb::Vec3s> positions_;
   std::vector<std::array<std::uint8_t, 3>> colours_;
   std::vector<float> qualities_;
@@ -189,6 +161,7 @@ const MeshFormat draco{.name = "Draco",
                        .read = readDraco,
                        .write = makeMeshEncoder<DracoEncoder>,
                        .holds_extras = true,
+                       .takes_draco = true,
                        .most = (std::uint64_t{1} << 31) / sizeof(openvdb::Vec3s),
                        .bytes_per_vertex = 17.5,
                        .us_per_vertex = 0.5};

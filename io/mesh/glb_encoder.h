@@ -1,17 +1,22 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include <openvdb/Types.h>
 
+#include "io/mesh/draco_encoding.h"
+#include "io/mesh/glb_document.h"
 #include "io/mesh/mesh_encoder.h"
 
 namespace vdbdither {
 
 /// Writes a GLB with one node. Its positions are mm, as they come, and the node scales them to
-/// metres: so they read back exactly. Colours are COLOR_0, linear, and the scalar is _QUALITY.
+/// metres: so they read back exactly.
 class GlbEncoder : public IndexedMeshEncoder {
  public:
   GlbEncoder(const std::filesystem::path& path, const VertexExtras& extras);
@@ -23,19 +28,34 @@ class GlbEncoder : public IndexedMeshEncoder {
   void finish(std::uint64_t vertices, std::uint64_t triangles) override;
 
  private:
-  [[nodiscard]] std::uint64_t stride() const;
-  [[nodiscard]] std::string json(std::uint64_t vertices, std::uint64_t triangles) const;
-  /// The header and the JSON chunk, of the same length for every count, and the header of the
-  /// binary chunk.
-  [[nodiscard]] std::string beginning(std::uint64_t vertices, std::uint64_t triangles) const;
-  /// Refuses a file whose length cannot be told in 32 bits.
+  /// Of the same length for every count.
+  [[nodiscard]] std::string beginning() const;
   void count(std::uint64_t bytes);
 
   VertexExtras extras_;
+  GlbMesh mesh_;
   std::uint64_t json_bytes_;
   std::uint64_t bytes_;
-  openvdb::Vec3s low_;
-  openvdb::Vec3s high_;
+};
+
+/// Writes the same mesh compressed by Draco. It is kept in memory: Draco encodes it as a whole.
+class CompressedGlbEncoder : public MeshEncoder {
+ public:
+  CompressedGlbEncoder(const std::filesystem::path& path, const VertexExtras& extras,
+                       double precision_mm);
+
+  void vertex(const MeshVertex& vertex) override;
+  void triangle(const Mesh::Triangle& triangle) override { encoding_.triangle(triangle); }
+
+ protected:
+  void finish(std::uint64_t vertices, std::uint64_t triangles) override;
+
+ private:
+  VertexExtras extras_;
+  DracoEncoding encoding_;
+  std::vector<openvdb::Vec3s> positions_;
+  std::vector<std::array<std::uint16_t, 4>> colours_;
+  std::vector<float> qualities_;
 };
 
 }  // namespace vdbdither

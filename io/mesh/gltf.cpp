@@ -331,6 +331,12 @@ MeshMatch matchGltf(const MeshFile& file) {
   return file.isText() && file.isNamed(".gltf") ? MeshMatch::name : MeshMatch::none;
 }
 
+std::unique_ptr<MeshEncoder> makeGlbEncoder(const std::filesystem::path& path,
+                                            const MeshEncoding& how) {
+  if (how.draco_mm) return std::make_unique<CompressedGlbEncoder>(path, how.extras, *how.draco_mm);
+  return std::make_unique<GlbEncoder>(path, how.extras);
+}
+
 }  // namespace
 
 extern const MeshFormat gltf;
@@ -338,8 +344,9 @@ const MeshFormat gltf{.name = "glTF",
                       .ending = ".glb",
                       .match = matchGltf,
                       .read = readGltf,
-                      .write = makeMeshEncoder<GlbEncoder>,
+                      .write = makeGlbEncoder,
                       .holds_extras = true,
+                      .takes_draco = true,
                       .most = std::numeric_limits<std::uint32_t>::max() / sizeof(Mesh::Triangle),
                       .bytes_per_vertex = 36,
                       .us_per_vertex = 0.2};

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include <openvdb/Types.h>
@@ -18,6 +19,14 @@ struct VertexExtras {
   bool colour = false;   ///< red, green, blue, sRGB
   bool quality = false;  ///< a scalar, which MeshLab calls quality
   std::string comment;   ///< a line that explains them
+};
+
+/// How a mesh file is to be written.
+struct MeshEncoding {
+  VertexExtras extras;
+  /// Compression by Draco, of formats that take it, and the maximum error of a coordinate in mm. Of
+  /// 0, nothing is rounded.
+  std::optional<double> draco_mm;
 };
 
 struct MeshVertex {

@@ -36,21 +36,24 @@ struct MeshFormat {
   Mesh (*read)(const MeshFile& file);
   /// Begins to write the file `path`. Throws DataError. Null where the format is only read.
   std::unique_ptr<MeshEncoder> (*write)(const std::filesystem::path& path,
-                                        const VertexExtras& extras) = nullptr;
+                                        const MeshEncoding& how) = nullptr;
 
   bool holds_extras = false;  ///< whether it writes the extras of vertices, or passes over them
+  bool takes_draco = false;   ///< whether Draco compresses it, always or if this is asked for
   std::uint64_t most = ~std::uint64_t{0};  ///< the maximum number of vertices, and of triangles
   /// What a vertex and its two triangles take in a file, about, and in CPU time to write.
   double bytes_per_vertex = 0;
   double us_per_vertex = 0;
 };
 
-/// Makes an `Encoder` for `MeshFormat::write`, with the extras where it takes them.
+/// Makes an `Encoder` for `MeshFormat::write`, with what it takes of `how`.
 template <class Encoder>
 std::unique_ptr<MeshEncoder> makeMeshEncoder(const std::filesystem::path& path,
-                                             const VertexExtras& extras) {
-  if constexpr (std::is_constructible_v<Encoder, std::filesystem::path, VertexExtras>) {
-    return std::make_unique<Encoder>(path, extras);
+                                             const MeshEncoding& how) {
+  if constexpr (std::is_constructible_v<Encoder, std::filesystem::path, MeshEncoding>) {
+    return std::make_unique<Encoder>(path, how);
+  } else if constexpr (std::is_constructible_v<Encoder, std::filesystem::path, VertexExtras>) {
+    return std::make_unique<Encoder>(path, how.extras);
   } else {
     return std::make_unique<Encoder>(path);
   }

@@ -25,8 +25,8 @@ void MeshWriter::check(const fs::path& path, bool overwrite) {
   StagedOutput::check(path, StagedOutput::Kind::file, overwrite);
 }
 
-MeshWriter::MeshWriter(const fs::path& path, const VertexExtras& extras)
-    : format_(formatToWrite(path)), encoder_(format_.write(path, extras)) {}
+MeshWriter::MeshWriter(const fs::path& path, const MeshEncoding& how)
+    : format_(formatToWrite(path)), encoder_(format_.write(path, how)) {}
 
 void MeshWriter::add(std::span<const openvdb::Vec3d> vertices,
                      std::span<const Mesh::Triangle> triangles, std::uint32_t open_from,

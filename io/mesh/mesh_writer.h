@@ -21,9 +21,9 @@ class MeshWriter {
   /// Checks that `path` names a mesh file that can be written. Throws UsageError.
   static void check(const std::filesystem::path& path, bool overwrite);
 
-  /// @param extras  what a format that does not hold them passes over
+  /// @param how  a format passes over extras that it does not hold, and over Draco
   /// Throws DataError.
-  explicit MeshWriter(const std::filesystem::path& path, const VertexExtras& extras = {});
+  explicit MeshWriter(const std::filesystem::path& path, const MeshEncoding& how = {});
 
   /// Adds vertices (mm) behind those before, and triangles that count them all. Throws DataError
   /// when the disk is full or the format cannot count so many.

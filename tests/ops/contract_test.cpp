@@ -51,7 +51,7 @@ void writeColouredPly(const Mesh& mesh, const fs::path& path) {
   for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
     colours.push_back({static_cast<std::uint8_t>(n), static_cast<std::uint8_t>(3 * n),
                        static_cast<std::uint8_t>(5 * n)});
-  MeshWriter writer(path, {true, false, ""});
+  MeshWriter writer(path, MeshEncoding{{true, false, ""}, {}});
   writer.add(mesh.vertices, mesh.triangles, 0, colours);
   writer.commit();
 }

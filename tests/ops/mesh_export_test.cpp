@@ -82,6 +82,20 @@ TEST(MeshExport, SlabsChangeNoByte) {
     EXPECT_TRUE(files.at(name) == files.at("whole-" + name)) << name;
 }
 
+TEST(MeshExport, DracoRoundsCoordinatesWithinTheLength) {
+  const test::ScratchFolder scratch;
+  const Schema in = ball();
+  for (const char* ending : {".glb", ".drc"}) {
+    const std::string path = scratch / ("a" + std::string(ending));
+    const std::string rounded = scratch / ("rounded" + std::string(ending));
+    Export({path}).run(in, 1000);
+    Export({rounded, "--draco", "0.5um"}).run(in, 1000);
+    EXPECT_LT(4 * std::filesystem::file_size(rounded), std::filesystem::file_size(path));
+    EXPECT_NEAR(test::volumeOf(readWhole(rounded)), test::volumeOf(readWhole(path)),
+                4 * std::numbers::pi * 0.36 * 0.0005);
+  }
+}
+
 TEST(MeshExport, ALevelIsADistance) {
   const test::ScratchFolder scratch;
   Export({scratch / "a.ply", "--grid", "surface", "--level", "50um"}).run(ball());
@@ -128,6 +142,10 @@ TEST(MeshExport, RefusesWhatHasNoSurface) {
     return [=] { Export(arguments)->plan(in); };
   };
   const Schema in = ball();
+  EXPECT_THAT(plan({"--draco", "1um"}, in),
+              ThrowsMessage<UsageError>("--draco: '" + path +
+                                        "' is not compressed; name a .drc or "
+                                        ".glb file, or leave it out"));
   EXPECT_THAT(plan({"--grid", "displaced"}, in),
               ThrowsMessage<DataError>("no grid 'displaced'; there is 'solid' 'surface'"));
   EXPECT_THAT(plan({}, test::schemaOf(in.lattice, {})),

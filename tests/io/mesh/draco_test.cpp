@@ -129,7 +129,7 @@ TEST(Draco, CarriesColoursThroughAFile) {
   for (std::size_t i = 0; i < 8; ++i) colours[i] = {static_cast<std::uint8_t>(i * 30), 1, 255};
   const std::vector<float> qualities(8, 0.5F);
   for (const char* name : {"a.drc", "a.glb"}) {
-    MeshWriter writer(scratch / name, {true, true, "as it was \"measured\""});
+    MeshWriter writer(scratch / name, MeshEncoding{{true, true, "as it was \"measured\""}, {}});
     writer.add(box.vertices, box.triangles, 0, colours, qualities);
     writer.commit();
     const Mesh mesh = readMesh(scratch / name, {}, MeshColours::read);

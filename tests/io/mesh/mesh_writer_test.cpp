@@ -46,7 +46,7 @@ TEST(MeshWriter, PlyCarriesColoursAndANumber) {
   const Mesh box = test::boxMesh({0, 0, 0}, {1, 1, 1});
   std::vector<std::array<std::uint8_t, 3>> colours(8, {1, 2, 3});
   const std::vector<float> qualities(8, 0.5F);
-  MeshWriter writer(scratch / "a.ply", {true, true, "as it was measured"});
+  MeshWriter writer(scratch / "a.ply", MeshEncoding{{true, true, "as it was measured"}, {}});
   writer.add(box.vertices, box.triangles, 0, colours, qualities);
   writer.commit();
   const std::string text = textOf(scratch / "a.ply");
