@@ -12,6 +12,7 @@
 #include "io/profile/material_table.h"
 #include "io/vdb/mask_cache.h"
 #include "ops/kernels/colour/coverage_reader.h"
+#include "ops/kernels/leaf/part_values.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/mask/mask_tile.h"
 #include "ops/kernels/mask/threshold_mask.h"
@@ -47,6 +48,9 @@ class HalftoneFilter : public Filter {
     options.text("coat", coat_, "LENGTH:NAME",
                  "Material over the colours, down to this depth below the printed surface, such as "
                  "0.1mm:clear");
+    options.text("parts", parts_, "NAME,...",
+                 "A material for each part, in the order of the meshes; 'colours' for a part that "
+                 "is printed in its colours");
     options.text("coverages", coverages_, "GRID=NAME,...",
                  "Grids of float that hold the coverages of materials, in place of colours; by "
                  "default the grids coverage_NAME, if there are any");
@@ -81,6 +85,7 @@ class HalftoneFilter : public Filter {
     if (core_.empty()) core_ = set_.inks[order.back()].name;
     core_material_ = static_cast<std::int32_t>(indexOf("--core", core_)) + 1;
     planCoat();
+    planParts(in);
     lattice_ = in.lattice;
     rest_material_ = rest_.empty() ? std::nullopt : std::optional(indexOf("--rest", rest_));
     halftone_.emplace(order, mask(in.lattice.pitch_mm));
@@ -95,6 +100,7 @@ class HalftoneFilter : public Filter {
     std::vector<Read> reads{
         {solid_grid, Reach::stencil(depthReach(coat_band_, lattice_.pitch_mm.z()))}};
     for (const Column& column : columns_) reads.push_back({column.grid, Reach::point()});
+    if (!part_materials_.empty()) reads.push_back({part_grid, Reach::point()});
     if (!columns_.empty()) return reads;
     reads.push_back({colour_grid, Reach::point()});
     if (has_opacity_) reads.push_back({opacity_grid, Reach::point()});
@@ -127,6 +133,10 @@ class HalftoneFilter : public Filter {
       const GridCoverages source(std::move(grids), rest_material_);
       material->setTree(halftone_->run(solid->tree(), source, core_material_, in.core));
     }
+    if (!part_materials_.empty()) {
+      const auto part = findGrid<Int32Grid>(in.grids, part_grid);
+      takeParts(material->tree(), part->tree(), part_materials_, keeps_colours);
+    }
     if (!coat_band_.empty()) {
       const auto coat =
           valueByDepth(*solid, lattice_.pitch_mm, lattice_.box, in.core, in.valid, coat_band_, 0);
@@ -136,6 +146,9 @@ class HalftoneFilter : public Filter {
   }
 
  private:
+  /// Of a part, in place of the index of a material.
+  static constexpr std::int32_t keeps_colours = 0;
+
   /// A grid of coverages.
   struct Column {
     std::string grid;
@@ -150,6 +163,18 @@ class HalftoneFilter : public Filter {
     const MaterialLayer coat = parseMaterialLayer("--coat", coat_, thickest_mm, "0.1mm:clear");
     const std::size_t material = indexOf("--coat", coat.material);
     coat_band_.push_back({coat.thickness_mm, static_cast<std::int32_t>(material) + 1});
+  }
+
+  void planParts(const Schema& in) {
+    part_materials_.clear();
+    if (parts_.empty()) return;
+    for (const std::string& name : commaList(parts_)) {
+      part_materials_.push_back(name == "colours"
+                                    ? keeps_colours
+                                    : static_cast<std::int32_t>(indexOf("--parts", name)) + 1);
+    }
+    checkPartCount(*findGrid<Int32Grid>(in.grids, part_grid), part_materials_.size(),
+                   "have their colours", [this](const std::string& text) { report().warn(text); });
   }
 
   /// Replaces the voxels of `material` that have a value in `coat`. All of these lie in leaves of
@@ -237,6 +262,7 @@ class HalftoneFilter : public Filter {
   InkOptions inks_;
   std::string core_;
   std::string coat_;
+  std::string parts_;
   std::string coverages_;
   std::string rest_;
   MaskSource mask_ = MaskSource::blue;
@@ -250,7 +276,8 @@ class HalftoneFilter : public Filter {
   std::optional<Halftone> halftone_;
   std::int32_t core_material_ = 1;
   Lattice lattice_;
-  std::vector<DepthBand> coat_band_;  ///< at most one
+  std::vector<DepthBand> coat_band_;          ///< at most one
+  std::vector<std::int32_t> part_materials_;  ///< of each part; empty: all have their colours
   std::optional<std::size_t> rest_material_;
 };
 

@@ -1,13 +1,11 @@
 #include <algorithm>
-#include <atomic>
 #include <memory>
 #include <sstream>
-
-#include <openvdb/tree/LeafManager.h>
 
 #include "io/profile/ink_set.h"
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
+#include "ops/kernels/leaf/part_values.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/leaf/split_tiles.h"
 #include "ops/kernels/printing/depth_bands.h"
@@ -24,9 +22,7 @@ namespace vdbdither {
 namespace {
 
 using openvdb::BoolGrid;
-using openvdb::Coord;
 using openvdb::Int32Grid;
-using openvdb::Int32Tree;
 
 /// `material` from `solid`.
 class MaterialAssign : public Filter {
@@ -66,7 +62,10 @@ class MaterialAssign : public Filter {
       return out;
     }
     planTable(in);
-    if (!parts_.empty()) checkPartCount(*findGrid<Int32Grid>(in.grids, part_grid));
+    if (!parts_.empty()) {
+      checkPartCount(*findGrid<Int32Grid>(in.grids, part_grid), part_materials_.size(),
+                     "take the last one", [this](const std::string& text) { report().warn(text); });
+    }
 
     Schema out = in;
     out.grids[material_grid] = makeMaterialGrid(solid->transform());
@@ -104,8 +103,12 @@ class MaterialAssign : public Filter {
     } else {
       material = makeMaterialGrid(solid->transform());
       material->setTree(valueWhereActive(solid->tree(), 1));
-      if (!parts_.empty())
-        takeParts(material->tree(), findGrid<Int32Grid>(in.grids, part_grid)->tree());
+      if (!parts_.empty()) {
+        const std::uint64_t strays =
+            takeParts(material->tree(), findGrid<Int32Grid>(in.grids, part_grid)->tree(),
+                      part_materials_, part_materials_.back());
+        if (strays > 0) report().count("voxels_of_no_part", static_cast<double>(strays));
+      }
     }
     material->setName(material_grid);
     return {{material_grid, material}};
@@ -152,50 +155,6 @@ class MaterialAssign : public Filter {
     } catch (const UsageError& error) {
       throw UsageError(option + ": " + error.what());
     }
-  }
-
-  /// Compares the number of materials with that of the parts, which grids of others may not tell.
-  void checkPartCount(const Int32Grid& part) {
-    const std::size_t given = part_materials_.size();
-    const auto text = [](std::size_t count, const std::string& what) {
-      return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
-    };
-    const auto count = part.getMetadata<openvdb::Int32Metadata>(part_count_key);
-    if (!count) {
-      report().warn("the grid 'part' does not say how many parts there are (its metadata " +
-                    std::string(part_count_key) + "); those beyond the " + text(given, "material") +
-                    " of --parts take the last one");
-    } else if (count->value() < 0 || static_cast<std::size_t>(count->value()) != given) {
-      throw UsageError("--parts: " + text(given, "material") + " for " +
-                       text(static_cast<std::size_t>(std::max(0, count->value())), "part") +
-                       "; name one for each, in the order of the meshes");
-    }
-  }
-
-  /// Replaces the voxels of `material` by the parts they belong to. A voxel of no part, or of one
-  /// beyond the list, takes the last material.
-  void takeParts(Int32Tree& material, const Int32Tree& part) const {
-    std::atomic<std::uint64_t> strays = 0;
-    const auto material_of = [&](std::int32_t index, std::uint64_t voxels) {
-      if (index >= 1 && static_cast<std::size_t>(index) <= part_materials_.size())
-        return part_materials_[static_cast<std::size_t>(index) - 1];
-      strays += voxels;
-      return part_materials_.back();
-    };
-    const openvdb::tree::ValueAccessor<const Int32Tree> nodes(part);
-    splitTiles(material, [&](const Coord& at) { return nodes.probeConstLeaf(at) != nullptr; });
-    auto tile = material.beginValueOn();
-    tile.setMaxDepth(Int32Tree::ValueOnIter::LEAF_DEPTH - 1);
-    for (; tile; ++tile)
-      tile.setValue(material_of(part.getValue(tile.getCoord()), tile.getVoxelCount()));
-    openvdb::tree::LeafManager<Int32Tree> leaves(material);
-    leaves.foreach ([&](Int32Tree::LeafNodeType& leaf, std::size_t) {
-      const openvdb::tree::ValueAccessor<const Int32Tree> accessor(part);
-      for (auto voxel = leaf.beginValueOn(); voxel; ++voxel) {
-        voxel.setValue(material_of(accessor.getValue(voxel.getCoord()), 1));
-      }
-    });
-    if (strays > 0) report().count("voxels_of_no_part", static_cast<double>(strays));
   }
 
   std::string material_;

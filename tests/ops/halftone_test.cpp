@@ -122,6 +122,13 @@ TEST(Halftone, RefusesWhatItCannotDo) {
                 "--black: the profile of --icc says it; leave it out");
   expectRefusal("halftone", {"--white", "absolute"}, schemaWith({"coverage_VeroCyan"}),
                 "--white: coverages are not separated again; leave it out");
+  expectRefusal("halftone", {"--parts", "colours,VeroClear"}, colours, "no grid 'part'");
+  Schema parts = colours;
+  const auto part = Int32Grid::create();
+  part->insertMeta(part_count_key, openvdb::Int32Metadata(2));
+  parts.grids["part"] = part;
+  expectRefusal("halftone", {"--parts", "glass,colours"}, parts, "--parts: no ink 'glass'; there");
+  expectRefusal("halftone", {"--parts", "colours"}, parts, "--parts: 1 material for 2 parts; ");
   expectRefusal("halftone", {"--mask", "white"}, colours,
                 "--size: only --mask blue has it; leave it out");
   Schema bare = colours;
@@ -224,6 +231,42 @@ TEST(Halftone, ACoatLiesOverTheColours) {
     }
   }
   EXPECT_EQ(test::firstBreach(planned.filter(), in, whole, 8), "");
+}
+
+TEST(Halftone, PartsHaveAMaterialOrTheirColours) {
+  const CoordBBox part_box(Coord(0), Coord(15));
+  const auto solid = openvdb::BoolGrid::create(false);
+  solid->fill(part_box, true, true);
+  const auto colour = Vec3SGrid::create();
+  colour->fill(part_box, openvdb::Vec3s(0.01F), true);
+  // Two parts share leaves; a third is a tile; a layer belongs to none.
+  const auto part = Int32Grid::create(0);
+  part->insertMeta(part_count_key, openvdb::Int32Metadata(3));
+  part->fill(CoordBBox(Coord(0), Coord(15, 15, 3)), 1, true);
+  part->fill(CoordBBox(Coord(0, 0, 4), Coord(15, 15, 6)), 2, true);
+  part->fill(CoordBBox(Coord(0, 0, 8), Coord(15)), 3, true);
+  const Grids whole{{"solid", solid}, {"Cd", colour}, {"part", part}};
+  Schema in = schemaWith({"Cd"});
+  in.grids["part"] = part->copyGridWithNewTree();
+  const auto halftoned = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"--size", "8"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    Planned planned("halftone", arguments);
+    planned.filter().plan(in);
+    EXPECT_EQ(test::firstBreach(planned.filter(), in, whole, 8), "");
+    return openvdb::gridConstPtrCast<Int32Grid>(
+        planned.filter().run({{0, 16}, {0, 16}, whole}).at("material"));
+  };
+  const auto all = halftoned({});
+  const auto some = halftoned({"--parts", "VeroCyan,colours,VeroClear"});
+  const auto same = halftoned({"--parts", "colours,colours,colours"});
+  for (auto ijk = part_box.begin(); ijk; ++ijk) {
+    const std::int32_t coloured = all->tree().getValue(*ijk);
+    const int z = (*ijk).z();
+    const std::int32_t expected = z < 4 ? 4 : z < 8 ? coloured : 3;
+    ASSERT_EQ(some->tree().getValue(*ijk), expected) << *ijk;
+    ASSERT_EQ(same->tree().getValue(*ijk), coloured) << *ijk;
+  }
 }
 
 TEST(MaterialAssign, HalftonesColoursUnlessTheCommandLineNamesAMaterial) {
