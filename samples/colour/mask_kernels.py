@@ -152,4 +152,5 @@ def main():
                                               "printers": results}) + "\n")
 
 
-main()
+if __name__ == "__main__":
+    main()
