@@ -11,6 +11,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <iterator>
 #include <limits>
 
@@ -30,8 +31,9 @@ constexpr std::size_t leaves_per_page = 32;
 using Doubles = double __attribute__((vector_size(32), may_alias));
 using Floats = float __attribute__((vector_size(16), may_alias));
 using Integers = std::int32_t __attribute__((vector_size(16), may_alias));
-using Row = float __attribute__((vector_size(32), may_alias, aligned(16)));
-using RowBits = std::int32_t __attribute__((vector_size(32), may_alias, aligned(16)));
+// Copied from and to the arrays of leaves, which are aligned to 16 bytes only.
+using Row = float __attribute__((vector_size(32), may_alias));
+using RowBits = std::int32_t __attribute__((vector_size(32), may_alias));
 
 constexpr int lanes = 4;
 constexpr Doubles ramp{0, 1, 2, 3};
@@ -341,7 +343,8 @@ template <int rank, bool track>
     std::uint64_t found = 0;
     for (int row = 0; row < edge * edge; row += edge) {
       const std::size_t offset = plane * edge * edge + static_cast<std::size_t>(row);
-      const Row& distance = *reinterpret_cast<const Row*>(distances + offset);
+      Row distance;
+      std::memcpy(&distance, distances + offset, sizeof distance);
       const RowBits on =
           (distance < limit_mm) & ((static_cast<std::int32_t>(exists[plane] >> row) & bit) == bit);
       Row value = distance < tie_mm ? tied : distance;
@@ -349,7 +352,8 @@ template <int rank, bool track>
       reinterpret_cast<RowBits&>(value) |=
           ((static_cast<std::int32_t>(inside[plane] >> row) & bit) == bit) &
           std::numeric_limits<std::int32_t>::min();
-      *reinterpret_cast<Row*>(values + offset) = value + 0.0F;  // no negative zero
+      value += 0.0F;  // no negative zero
+      std::memcpy(values + offset, &value, sizeof value);
 #ifdef __SSE2__
       const auto* halves = reinterpret_cast<const __m128*>(&on);
       const auto marks =
