@@ -17,6 +17,7 @@
 
 #include "ops/kernels/distance/mesh_distance_block.h"
 #include "ops/kernels/leaf/node_writer.h"
+#include "ops/kernels/leaf/tie.h"
 #include "vdbdither/model/known_grids.h"
 
 namespace vdbdither {
@@ -63,9 +64,7 @@ double tieWithin(const Mesh& mesh, const Lattice& lattice, double asked_mm) {
   for (const Vec3d& v : mesh.vertices)
     for (int axis = 0; axis < 3; ++axis)
       maximum_mm = std::max(maximum_mm, std::abs(v[axis]) + std::abs(lattice.origin_mm[axis]));
-  const Vec3d& pitch_mm = lattice.pitch_mm;
-  return std::min(std::max(asked_mm, rounding * maximum_mm),
-                  std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()}) / 4);
+  return std::min(std::max(asked_mm, rounding * maximum_mm), mostTieMm(lattice.pitch_mm));
 }
 
 /// Returns the maximum band, in diameters, of the normals whose components are at least `least`.

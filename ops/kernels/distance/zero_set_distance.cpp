@@ -25,11 +25,11 @@ Band widened(const Band& band, const Vec3d& pitch_mm, double slack_mm) {
 }
 
 /// What single precision leaves open of positions in such a box.
-double tieOf(const ZeroSet::Bounds& bounds) {
+double tieOf(const ZeroSet::Bounds& bounds, const Vec3d& pitch_mm) {
   double maximum_mm = 0;
   for (int axis = 0; axis < 3; ++axis)
     maximum_mm = std::max({maximum_mm, std::abs(bounds.min[axis]), std::abs(bounds.max[axis])});
-  return 0x1p-20 * maximum_mm;
+  return std::min(0x1p-20 * maximum_mm, mostTieMm(pitch_mm));
 }
 
 int chunkOf(int layer, int layers) { return (layer - (layer < 0 ? layers - 1 : 0)) / layers; }
@@ -41,7 +41,7 @@ ZeroSetDistance::ZeroSetDistance(std::shared_ptr<const ZeroSet> surface, const L
     : surface_(std::move(surface)),
       lattice_(lattice),
       wide_(widened(band, lattice.pitch_mm, slack_mm)),
-      tie_mm_(tieOf(surface_->bounds())) {}
+      tie_mm_(tieOf(surface_->bounds(), lattice.pitch_mm)) {}
 
 std::shared_ptr<const MeshDistance> ZeroSetDistance::chunk(int index) const {
   const std::lock_guard lock(mutex_);

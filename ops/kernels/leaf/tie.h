@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -12,6 +13,12 @@ namespace vdbdither {
 /// |d| of a voxel whose centre lies on the surface, mm: the sign alone says on which side it
 /// counts. The smallest number that half precision holds, so that `write --half` keeps the side.
 inline constexpr float tied_mm = 0x1p-24F;
+
+/// The maximum distance that counts as a tie: of a part far from the origin, more would flatten
+/// what the dither makes of the distances next to the surface.
+inline double mostTieMm(const openvdb::Vec3d& pitch_mm) {
+  return std::min({pitch_mm.x(), pitch_mm.y(), pitch_mm.z()}) / 32;
+}
 
 /// What is left after moving a surface by a length is a tie below this, mm.
 inline constexpr double moved_tie_mm = 1e-6;

@@ -72,6 +72,22 @@ TEST(Ties, ACubeHasAsManyVoxelsAsItsVolumeWhereverItLies) {
   }
 }
 
+TEST(Ties, AreNoMoreThanA32ndOfAVoxelApartHoweverFarThePartLies) {
+  const double pitch_mm = 0.1;
+  // The face at the maximum x lies 3 µm, then 3.3 µm beyond a centre; a 32nd is 3.125 µm.
+  for (const double beyond_mm : {0.003, 0.0033}) {
+    const Mesh box = test::boxMesh({0, 0, 0}, {1 + beyond_mm, 1, 1});
+    const Lattice lattice = latticeOf(box, Vec3d(pitch_mm));
+    const auto surface = distances(box, lattice, 1);
+    const double d_mm = double{surface->tree().getValue(Coord(10, 5, 5))};
+    if (beyond_mm < pitch_mm / 32) {
+      EXPECT_EQ(std::abs(d_mm), double{tied_mm});
+    } else {
+      EXPECT_NEAR(d_mm, -beyond_mm, 1e-6);
+    }
+  }
+}
+
 TEST(Ties, ABoxBeginsWithItsLowerFacesAndEndsBeforeItsUpperOnes) {
   const Vec3d pitch_mm(0.042, 0.084, 0.022);
   const CoordBBox inside(Coord(-2, 5, 9), Coord(7, 9, 20));
