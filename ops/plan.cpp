@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "io/file/file_name.h"
 #include "io/file/staged_output.h"
 #include "io/file/text_bytes.h"
 #include "io/job/job.h"
@@ -114,8 +115,12 @@ class Plan : public Tool {
     trial.makePiece(pieces_name);
   }
 
-  static void checkPlan(const JobPlan& whole) {
+  void checkPlan(const JobPlan& whole) const {
     for (const StagePlan& stage : whole.stages) {
+      if (!stage.output.path.empty() && liesWithin(stage.output.path, folder_)) {
+        throw UsageError(stage.name + ": '" + stage.output.path +
+                         "' lies in the folder of the job; name another place");
+      }
       for (const InputPlan& input : stage.inputs) {
         if (input.is_pipe) {
           throw UsageError(stage.name +

@@ -269,11 +269,7 @@ class SliceExport : public Sink {
 
   void planPage() const {
     if (page_name_.empty()) return;
-    const std::filesystem::path folder =
-        std::filesystem::absolute(folder_ + "/").lexically_normal();
-    const std::filesystem::path page = std::filesystem::absolute(page_name_).lexically_normal();
-    if (std::mismatch(folder.begin(), std::prev(folder.end()), page.begin(), page.end()).first ==
-        std::prev(folder.end()))
+    if (liesWithin(page_name_, folder_))
       throw UsageError("--page: '" + page_name_ + "' lies in the stack, which holds slices only");
     StackPage::check(page_name_, overwrite_.overwrite);
   }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <map>
@@ -6,7 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include <openvdb/io/Compression.h>
 #include <openvdb/tools/Prune.h>
+#include <openvdb/tree/LeafManager.h>
 
 #include "io/file/staged_output.h"
 #include "io/file/standard_streams.h"
@@ -31,19 +34,37 @@ constexpr std::array<Choice<VdbCodec>, 3> codecs{
      {VdbCodec::mask, "mask", "Active voxels, uncompressed"},
      {VdbCodec::none, "none", "All voxels of each leaf, uncompressed"}}};
 
-/// All slabs of a grid in one, in canonical form; `pieces` is empty then.
-GridConstPtr whole(std::vector<GridLayers>& pieces, ZRange layers) {
-  const GridConstPtr joined = joinLayers(pieces, layers);
-  if (joined == pieces.front().grid) {
-    pieces.clear();
-    return pruned(joined);
+/// Rounds all values of a tree as an archive of half floats does. Values of other types stay.
+template <typename Tree>
+void roundToHalf(Tree& tree) {
+  using Value = typename Tree::ValueType;
+  if constexpr (openvdb::io::RealToHalf<Value>::isReal) {
+    const auto round = [](const Value& value) { return openvdb::io::truncateRealToHalf(value); };
+    auto tile = tree.beginValueAll();
+    tile.setMaxDepth(Tree::ValueAllIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) tile.setValue(round(*tile));
+    openvdb::tree::LeafManager<Tree> leaves(tree);
+    leaves.foreach ([&](auto& leaf, std::size_t) {
+      auto* values = leaf.buffer().data();
+      std::transform(values, values + leaf.buffer().size(), values, round);
+    });
   }
+}
+
+/// All slabs of a grid in one, in canonical form; `pieces` is empty then. What is constant only
+/// once it is rounded becomes a tile as well, as it does where rounded pieces are joined.
+GridConstPtr whole(std::vector<GridLayers>& pieces, ZRange layers, bool as_half) {
+  const GridConstPtr joined = joinLayers(pieces, layers);
+  const bool is_own = joined != pieces.front().grid;
   pieces.clear();
+  if (!is_own && !as_half) return pruned(joined);
   // Joined just now, so nobody else's: it needs no copy to be changed.
-  const auto own = std::const_pointer_cast<openvdb::GridBase>(joined);
+  const auto own =
+      is_own ? std::const_pointer_cast<openvdb::GridBase>(joined) : joined->deepCopyGrid();
   visitGrid(*own, [&](const auto& typed) {
-    using GridT = std::decay_t<decltype(typed)>;
-    openvdb::tools::prune(openvdb::gridPtrCast<GridT>(own)->tree());
+    auto& tree = openvdb::gridPtrCast<std::decay_t<decltype(typed)>>(own)->tree();
+    if (as_half) roundToHalf(tree);
+    openvdb::tools::prune(tree);
   });
   return own;
 }
@@ -129,7 +150,8 @@ class WriteOperator : public Sink {
       return;
     }
     Grids grids;
-    for (auto& [name, pieces] : pieces_) grids[name] = whole(pieces, schema_.lattice.layers());
+    for (auto& [name, pieces] : pieces_)
+      grids[name] = whole(pieces, schema_.lattice.layers(), half_);
     if (grids.empty()) grids = schema_.grids;
     VdbContents contents = contentsOf(schema_, grids);
     if (written_ != schema_.lattice.layers()) {
@@ -155,7 +177,9 @@ class WriteOperator : public Sink {
   /// The file of a piece.
   static constexpr const char* piece_name = "piece.vdb";
 
-  [[nodiscard]] bool isPipe() const { return path_.empty() || path_ == "-"; }
+  [[nodiscard]] bool isPipe() const {
+    return path_.empty() || path_ == "-" || path_ == "/dev/stdout";
+  }
 
   void refuseOtherFormats() const {
     if (meshFormatNamedBy(path_) != nullptr)

@@ -1,7 +1,9 @@
 #include "io/file/file_name.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
+#include <iterator>
 
 #include "vdbdither/model/printable.h"
 
@@ -39,6 +41,17 @@ std::optional<std::string> relativePathProblem(std::string_view path) {
     if (slash == path.npos) return std::nullopt;
     path.remove_prefix(slash + 1);
   }
+}
+
+bool liesWithin(const std::filesystem::path& path, const std::filesystem::path& folder) {
+  // Both end with an empty name, which tells /job from /jobs.
+  const auto whole = [](const std::filesystem::path& name) {
+    return std::filesystem::absolute(name / "").lexically_normal();
+  };
+  const std::filesystem::path outer = whole(folder);
+  const std::filesystem::path inner = whole(path);
+  const auto end = std::prev(outer.end());
+  return std::mismatch(outer.begin(), end, inner.begin(), inner.end()).first == end;
 }
 
 }  // namespace vdbdither

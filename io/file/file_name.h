@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,5 +21,8 @@ std::optional<std::string> fileNameProblem(std::string_view name);
 
 /// The same for a path below a folder: names with a `/` between them.
 std::optional<std::string> relativePathProblem(std::string_view path);
+
+/// Whether `path` is `folder` or leads into it, by their names: neither need exist.
+bool liesWithin(const std::filesystem::path& path, const std::filesystem::path& folder);
 
 }  // namespace vdbdither

@@ -68,6 +68,9 @@ class Jobs(ProgramTest):
     def test_grids_are_those_of_one_run_and_several_outputs_too(self):
         self.check_merged(f"mesh2sdf part.stl {' '.join(MIMAKI)} --normals ! write mid.vdb --half ! dither -o out.vdb", "mid.vdb", "out.vdb")
 
+    def test_leaves_that_are_constant_only_as_half_floats_are_those_of_one_run(self):
+        self.check_merged(f"mesh2sdf part.stl {' '.join(MIMAKI)} ! dither ! simulate --spread 20um,20um,100um ! write out.vdb --half", "out.vdb")
+
     def test_a_file_of_grids_is_cut_too(self):
         self.succeed("mesh2sdf", "part.stl", *MIMAKI, "-o", "surface.vdb")
         self.check_merged("dither surface.vdb ! slice-export out", "out")
@@ -223,6 +226,9 @@ class Jobs(ProgramTest):
                 (f"{DITHER} ! slice-export out --explain", "--explain: plan runs nothing"),
                 (f"{DITHER} ! slice-export out --help", "asks for --help")):
             self.refuse(2, message, "plan", chain, "--pieces", "2")
+        for folder in ("job", "./job"):
+            self.refuse(2, f"slice-export: '{folder}' lies in the folder of the job; name another place", "plan",
+                        f"{DITHER} ! slice-export {folder}", "--pieces", "2")
         self.refuse(2, "give one of --pieces, --piece-memory and --piece-time", "plan", f"{DITHER} ! slice-export out", "--pieces", "2",
                     "--piece-time", "1h")
         self.refuse(2, "'soon' is not accepted; give a time such as 90s, 10min or 2h", "plan", DITHER, "--piece-time", "soon")

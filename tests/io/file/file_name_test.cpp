@@ -65,5 +65,15 @@ TEST(FileName, APathBelowAFolderConsistsOfNames) {
   EXPECT_THAT(relativePathProblem("C:\\x"), Optional(Eq("contains '\\'")));
 }
 
+TEST(FileName, WhatLiesWithinAFolderIsSeenByTheNames) {
+  EXPECT_TRUE(liesWithin("job", "job"));
+  EXPECT_TRUE(liesWithin("job/", "./job"));
+  EXPECT_TRUE(liesWithin("job/a/b", "job"));
+  EXPECT_TRUE(liesWithin("x/../job/a", "job/"));
+  EXPECT_FALSE(liesWithin("jobs", "job"));
+  EXPECT_FALSE(liesWithin("job", "job/a"));
+  EXPECT_FALSE(liesWithin("job/../a", "job"));
+}
+
 }  // namespace
 }  // namespace vdbdither
