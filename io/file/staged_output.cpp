@@ -266,11 +266,29 @@ int flushed(const fs::path& path, int (*flush)(int)) {
   return error == EINVAL || error == ENOTSUP || error == ENOSYS || error == EROFS ? 0 : error;
 }
 
+/// Whether a path leads through a name of a descriptor, such as /dev/stdout, which the program may
+/// have pointed elsewhere.
+bool namesDescriptor(fs::path path) {
+  std::error_code error;
+  const fs::path descriptors = fs::canonical("/proc/self/fd", error);
+  if (error) return false;
+  constexpr int most_links = 40;
+  for (int n = 0; n < most_links; ++n) {
+    if (fs::canonical(parentOf(path), error) == descriptors && !error) return true;
+    const fs::path next = fs::read_symlink(path, error);
+    if (error) return false;
+    path = next.is_absolute() ? next : parentOf(path) / next;
+  }
+  return false;
+}
+
 }  // namespace
 
 void StagedOutput::check(const fs::path& given, Kind kind, bool overwrite) {
-  const fs::path target = destination(given);
   const std::string name = quoted(given);
+  if (namesDescriptor(given))
+    throw UsageError(name + " stands for an open file of the program; name the file itself");
+  const fs::path target = destination(given);
   if (target.empty() || target.filename() == "." || target.filename() == ".." ||
       !target.has_filename()) {
     throw UsageError("cannot write to " + name + ": give a folder or file a name of its own");

@@ -208,6 +208,17 @@ class Stops(ProgramTest):
         sender.join()
         self.assertEqual((downstream.returncode, said, data == expected), (0, b"", True))
 
+    def test_the_name_of_standard_output_is_standard_output(self):
+        expected = self.succeed("mesh2sdf", "part.stl", *MIMAKI)
+        log = self.folder / "log.txt"
+        with open(self.folder / "out.vdb", "wb") as out, open(log, "wb") as said:
+            said.write(b"precious")
+            said.flush()
+            process = self.start("mesh2sdf", "part.stl", *MIMAKI, "-o", "/dev/stdout", "--overwrite", stdout=out, stderr=said)
+            self.assertEqual(process.wait(60 * PATIENCE), 0)
+        self.assertEqual(log.read_bytes(), b"precious")
+        self.assertEqual((self.folder / "out.vdb").read_bytes(), expected)
+
     def test_a_full_disk_at_standard_output_is_reported(self):
         with open("/dev/full", "wb") as full:
             self.refuse(1, "No space left on device", "mesh2sdf", "part.stl", *MIMAKI, stdout=full)

@@ -527,6 +527,18 @@ TEST(StagedOutput, RefusesBeforeAnyWork) {
               ThrowsMessage<UsageError>("'/dev/null' is not an ordinary file"));
 }
 
+TEST(StagedOutput, RefusesNamesOfDescriptors) {
+  const test::ScratchFolder scratch;
+  fs::create_symlink("/dev/stdout", scratch / "link");
+  for (const std::string& name : {std::string("/dev/stdout"), std::string("/dev/fd/1"),
+                                  std::string("/proc/self/fd/2"), std::string(scratch / "link")}) {
+    EXPECT_THAT([&] { StagedOutput::check(name, Kind::file, true); },
+                ThrowsMessage<UsageError>("'" + name +
+                                          "' stands for an open file of the program; name the "
+                                          "file itself"));
+  }
+}
+
 TEST(StagedOutput, ATargetIsWrittenOnceAtATime) {
   const test::ScratchFolder scratch;
   fs::create_symlink("a.vdb", scratch / "link.vdb");
