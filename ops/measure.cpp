@@ -157,6 +157,7 @@ class SurfaceMeasurement {
     options.length("map-range", map_range_mm_, Range::above(0, 1000),
                    "Error that the last colours of the map stand for",
                    {"auto", "The 99th percentile of the error"});
+    options.belongTo("--map", [this] { return !map_file_.empty(); });
     json_.declare(options);
     overwrite_.declare(options, "each file");
   }
@@ -237,6 +238,7 @@ class SurfaceMeasurement {
   void readReference(const Lattice* lattice, Reporter& reporter) {
     Mesh mesh = readMesh(reference_file_, [&](const std::string& text) { reporter.warn(text); });
     const MeshPlacementOptions& given = placement_;
+    checkUnit(mesh, reference_file_, given);
     MeshPlacement placement{given.rotate_degrees, given.mmPerUnit(), given.fit_mm.value_or(0)};
     if (given.on_bed) placement.corner_mm = bedCornerMm(*lattice);
     place(mesh, placement);

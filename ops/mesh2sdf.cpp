@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <utility>
@@ -64,6 +65,7 @@ class MeshToSdf : public Source {
                  "opacity. Voxels from one diameter outside to --colour-depth inside have them");
     options.length("colour-depth", colour_depth_mm_, {0, 1000},
                    "How far below the surface voxels have a colour");
+    options.belongTo("--colour", [this] { return colour_; });
     options.file("texture", texture_file_, "FILE",
                  "Image for the meshes that have texture coordinates but name no image of their "
                  "own; needs --colour");
@@ -223,6 +225,7 @@ class MeshToSdf : public Source {
       files.push_back(readMesh(
           path, [this](const std::string& text) { report().warn(text); },
           colour_ ? MeshColours::read : MeshColours::skip));
+    for (std::size_t n = 0; n < files.size(); ++n) checkUnit(files[n], paths_[n], placement_);
     if (!texture_file_.empty()) addTexture(files);
     const auto has_colours = [](const Mesh& mesh) {
       return mesh.appearance && mesh.appearance->hasColours();
@@ -265,9 +268,11 @@ class MeshToSdf : public Source {
   /// Warns of a part that is hardly meant to be as large or as small as it is.
   void questionSize(std::span<const Mesh> meshes, const Schema& schema) const {
     const MeshBounds bounds = boundsOf(meshes);
-    if (const auto question =
-            sizeQuestion(bounds.max - bounds.min, placement_, placement_.fit_mm.has_value(), schema,
-                         "turn it with --rotate, or see --unit and --fit"))
+    const bool is_known =
+        placement_.fit_mm || std::any_of(meshes.begin(), meshes.end(),
+                                         [](const Mesh& mesh) { return mesh.states_unit; });
+    if (const auto question = sizeQuestion(bounds.max - bounds.min, placement_, is_known, schema,
+                                           "turn it with --rotate, or see --unit and --fit"))
       report().warn(*question);
   }
 
@@ -294,10 +299,16 @@ class MeshToSdf : public Source {
       return static_cast<std::size_t>(
           std::clamp((z_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(top_row)));
     };
-    double area_mm2 = 0;
+    // A wide band reaches the middle of the part, and grows around it as a ball does.
+    const MeshBounds bounds = boundsOf(mesh);
+    const double area_mm2 = areaOf(mesh);
+    const double inner_share =
+        std::min(1.0, std::abs(volumeOf(mesh)) / std::max(held_mm * area_mm2, 1e-300));
+    const double corners_mm3 =
+        std::numbers::pi * held_mm * held_mm * ((bounds.max - bounds.min).sum() + 4 * held_mm / 3);
     double across_mm3 = 0;  // swept by leaves that touch the surface
     const auto leavesWithin = [&](double distance_mm, double area, double across) {
-      return (2 * distance_mm * area + across) / leaf_mm.product();
+      return ((1 + inner_share) * distance_mm * area + across) / leaf_mm.product();
     };
     for (const Mesh::Triangle& t : mesh.triangles) {
       const Vec3d& a = mesh.vertices[t[0]];
@@ -306,7 +317,6 @@ class MeshToSdf : public Source {
       // The leaf's own extent along the normal.
       const double across = std::abs(facing.x()) * leaf_mm.x() +
                             std::abs(facing.y()) * leaf_mm.y() + std::abs(facing.z()) * leaf_mm.z();
-      area_mm2 += area;
       across_mm3 += across;
       const auto [z_low, z_high] =
           std::minmax({mesh.vertices[t[0]].z(), mesh.vertices[t[1]].z(), mesh.vertices[t[2]].z()});
@@ -315,11 +325,17 @@ class MeshToSdf : public Source {
       for (std::size_t row = first; row <= last; ++row)
         rows[row] += leavesWithin(held_mm, area, across) / static_cast<double>(last - first + 1);
     }
+    const double corner_leaves = corners_mm3 / leaf_mm.product();
+    const std::size_t first = rowAt(bounds.min.z() - band_mm);
+    const std::size_t last = rowAt(bounds.max.z() + band_mm);
+    // The middle of a ball is half as large again as its mean.
+    for (std::size_t row = first; row <= last; ++row)
+      rows[row] += 1.5 * corner_leaves / static_cast<double>(last - first + 1);
     triangles_per_leaf_ =
         static_cast<double>(mesh.triangles.size()) / leavesWithin(0, area_mm2, across_mm3);
     const double diagonal_mm = lattice.pitch_mm.length();
     schema.footprint = {*std::max_element(rows.begin(), rows.end()),
-                        leavesWithin(held_mm, area_mm2, across_mm3),
+                        leavesWithin(held_mm, area_mm2, across_mm3) + corner_leaves,
                         leavesWithin(std::min(band_mm, diagonal_mm), area_mm2, across_mm3)};
   }
 

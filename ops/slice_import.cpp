@@ -260,12 +260,16 @@ class ImageLayers : public Input {
     planGrids();
     const ZRange layers = schema_.lattice.layers();
     bool any_empty = false;
+    bool any_printed = false;
     schema_.footprint = sampledFootprint(layers, layers, [&](int z) {
       SpanImage image = layer(z);
-      any_empty = any_empty || std::any_of(image.spans.begin(), image.spans.end(),
-                                           [](const Span& span) { return span.value == 0; });
+      for (const Span& span : image.spans) (span.value == 0 ? any_empty : any_printed) = true;
       return image;
     });
+    if (!any_printed) {
+      warn("'" + path_ + "': the images that were looked at print nothing" +
+           (empty_.is_mask ? "; of grey images, pixels above half are printed" : ""));
+    }
     if (!any_empty) {
       warn("'" + path_ + "': no pixel of its images is empty" +
            (options.background.empty() ? "; give their --background if they have one" : ""));

@@ -90,6 +90,7 @@ class Stats : public Sink {
                  "Counts the active values of this grid of numbers in bins");
     options.integer("bins", bins_, {2, 65536},
                     "Maximum number of bins; their edges are multiples of a power of two");
+    options.belongTo("--histogram", [this] { return !histogram_grid_.empty(); });
     json_.declare(options);
   }
 

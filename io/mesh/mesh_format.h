@@ -38,6 +38,7 @@ struct MeshFormat {
   std::unique_ptr<MeshEncoder> (*write)(const std::filesystem::path& path,
                                         const MeshEncoding& how) = nullptr;
 
+  bool states_unit = false;   ///< whether its files say what their numbers mean
   bool holds_extras = false;  ///< whether it writes the extras of vertices, or passes over them
   bool takes_draco = false;   ///< whether Draco compresses it, always or if this is asked for
   std::uint64_t most = ~std::uint64_t{0};  ///< the maximum number of vertices, and of triangles

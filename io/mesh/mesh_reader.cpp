@@ -7,6 +7,7 @@
 
 #include "io/mesh/file_bytes.h"
 #include "io/mesh/mesh_format.h"
+#include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 
@@ -77,10 +78,19 @@ const MeshFormat& formatOf(const MeshFile& file) {
 }  // namespace
 
 Mesh parseMesh(const MeshFile& file) {
-  Mesh mesh = formatOf(file).read(file);
+  const MeshFormat& format = formatOf(file);
+  Mesh mesh = format.read(file);
+  mesh.states_unit = format.states_unit;
   if (mesh.triangles.empty()) file.refuse("holds no triangles; export a surface mesh");
   dropUnusedVertices(mesh);
   return mesh;
+}
+
+void checkUnit(const Mesh& mesh, const std::filesystem::path& path,
+               const MeshPlacementOptions& placement) {
+  if (!mesh.states_unit || placement.unit == LengthUnit::mm || placement.fit_mm) return;
+  throw UsageError("--unit: '" + path.string() +
+                   "' states the unit of its numbers; leave it out, or give --scale");
 }
 
 Mesh readMesh(const std::filesystem::path& path,

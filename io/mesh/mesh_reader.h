@@ -5,6 +5,7 @@
 #include <string>
 
 #include "io/mesh/mesh_file.h"
+#include "vdbdither/engine/option_groups.h"
 #include "vdbdither/model/mesh.h"
 
 namespace vdbdither {
@@ -24,6 +25,10 @@ namespace vdbdither {
 Mesh readMesh(const std::filesystem::path& path,
               const std::function<void(const std::string&)>& warn,
               MeshColours colours = MeshColours::skip);
+
+/// Refuses --unit for a mesh whose file states the unit of its numbers. Throws UsageError.
+void checkUnit(const Mesh& mesh, const std::filesystem::path& path,
+               const MeshPlacementOptions& placement);
 
 /// The same for a file whose bytes are in memory.
 Mesh parseMesh(const MeshFile& file);

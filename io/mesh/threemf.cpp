@@ -105,7 +105,10 @@ Mesh readThreemf(const MeshFile& file) {
 }  // namespace
 
 extern const MeshFormat threemf;
-const MeshFormat threemf{
-    .name = "3MF", .ending = ".3mf", .match = matchThreemf, .read = readThreemf};
+const MeshFormat threemf{.name = "3MF",
+                         .ending = ".3mf",
+                         .match = matchThreemf,
+                         .read = readThreemf,
+                         .states_unit = true};
 
 }  // namespace vdbdither

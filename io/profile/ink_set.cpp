@@ -100,8 +100,6 @@ InkSet inkSetOf(const InkOptions& options, const Schema& in, const std::vector<M
     if (!options.mixing_given.empty())
       throw UsageError(options.mixing_given + ": the profile of --icc says it; leave it out");
     set.table = readIccCoverages(options, set);
-  } else if (!options.icc_given.empty()) {
-    throw UsageError(options.icc_given + ": belongs to --icc; leave it out, or give a profile");
   }
   return set;
 }

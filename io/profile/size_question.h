@@ -13,7 +13,8 @@ namespace vdbdither {
 /// other size.
 ///
 /// \param placement  the unit that was assumed
-/// \param is_fitted  whether the size was asked for, so that another unit would not change it
+/// \param is_fitted  whether the size was asked for or the file states it, so that no other unit
+///     would change it
 /// \param remedy     what helps a part that is larger than the printer
 std::optional<std::string> sizeQuestion(const openvdb::Vec3d& size_mm,
                                         const PlacementOptions& placement, bool is_fitted,

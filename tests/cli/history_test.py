@@ -40,7 +40,7 @@ class History(ProgramTest):
     def test_every_value_is_recorded_be_it_a_default_or_not(self):
         self.succeed("run", "mesh2sdf part.stl --printer mimaki-3duj-553 ! normals ! dither ! material-assign ! simulate -o x.vdb")
         self.assertEqual(self.arguments("x.vdb", "mesh2sdf"),
-                         "part.stl --printer mimaki-3duj-553 --unit mm --scale 1 --rotate 0,0,0 --refine-y 1 --band 1 --colour-depth 1mm --overlap first")
+                         "part.stl --printer mimaki-3duj-553 --unit mm --scale 1 --rotate 0,0,0 --refine-y 1 --band 1 --overlap first")
         self.assertEqual(self.arguments("x.vdb", "normals"), "")
         self.assertEqual(self.arguments("x.vdb", "dither"),
                          "--preset best --method diffusion --guard walls --spread 0.05mm,0.05mm,0.05mm --refine 0")

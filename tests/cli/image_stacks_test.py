@@ -101,6 +101,12 @@ class ImageStacks(ProgramTest):
             again = {path.name: Image.open(path).tobytes() for path in sorted((self.folder / "again").glob("slice_*.png"))}
             self.assertEqual(again, pixels, stack)
 
+    def test_images_that_print_nothing_are_told(self):
+        self.draw("a1.png", [[0, 1, 1], [0, 1, 1]], "L")
+        self.draw("a2.png", [[0, 1, 1], [0, 1, 1]], "L")
+        grids = self.imported(warning="'out': the images that were looked at print nothing; of grey images, pixels above half are printed")
+        self.assertEqual(self.voxels(grids["solid"]), {})
+
     def test_colours_become_linear_light_and_the_last_row_is_the_least_y(self):
         self.draw("a1.png", [[RED, CLEAR, GREEN], [CLEAR, CLEAR, FAINT]])
         self.draw("a2.png", [[CLEAR, CLEAR, CLEAR], [RED, CLEAR, CLEAR]])

@@ -96,7 +96,7 @@ class Manners(ProgramTest):
                 (f"{source} ! render x.png --samples 2000", "--samples 20000", 8, 12),
                 (f"{source} ! render x.png --samples 4000", "--frame part.stl", 0.5, 2),
                 (f"{source} ! measure --reference part.stl --spacing 0.01", "--spacing 0.001", 50, 120),
-                (f"{source} --band 100 -o x.vdb", "--band 1000", 8, 12),
+                (f"{source} --band 100 -o x.vdb", "--band 1000", 400, 700),
                 ("mask --size 64 --threads 1 --kernel gauss -o x.vdb", "--sigma 3", 4, 20),
                 ("mask --size 96 --threads 1 -o x.vdb", "--size 192", 8, 30),
                 ("mask --size 64 --threads 1 ! mask-spectrum x.json", "--step 0.5", 2, 4)):

@@ -190,6 +190,35 @@ TEST(Options, RefusalsSayWhatIsAccepted) {
                   "to 10 mm");
 }
 
+TEST(Options, AnEmptyNameOfAFileIsRefused) {
+  std::string file;
+  std::string page;
+  std::string prefix = "slice_";
+  Options options;
+  options.positional("file", file, "The file", false);
+  options.file("page", page, "FILE", "The page");
+  options.text("prefix", prefix, "TEXT", "The prefix");
+  EXPECT_EQ(refusal(options, {""}), "file: the name is empty");
+  EXPECT_EQ(refusal(options, {"--page", ""}), "--page: the name is empty");
+  EXPECT_EQ(refusal(options, {"--page="}), "--page: the name is empty");
+  EXPECT_EQ(refusal(options, {"--prefix", ""}), "");
+  EXPECT_EQ(prefix, "");
+}
+
+TEST(Options, AnOptionThatBelongsToAnotherIsRefusedWithoutIt) {
+  bool smooth = false;
+  int steps = 3;
+  Options options;
+  options.integer("steps", steps, {1, 9}, "How many");
+  options.belongTo("--smooth", [&] { return smooth; });
+  options.flag("smooth", smooth, "Smooths");
+  EXPECT_EQ(options.canonical(), "");
+  EXPECT_EQ(refusal(options, {"--steps", "4"}),
+            "--steps: belongs to --smooth; leave it out, or give that too");
+  EXPECT_EQ(refusal(options, {"--steps", "4", "--smooth"}), "");
+  EXPECT_EQ(options.canonical(), "--steps 4 --smooth");
+}
+
 TEST(Options, AValueThatIsMissingIsToldHowToBeGiven) {
   const Example example;
   EXPECT_EQ(refusal(example.options, {"a", "--fit"}),
@@ -207,7 +236,7 @@ TEST(Options, WhatIsNotExpectedAndWhatIsForgottenIsNamed) {
   const Example example;
   EXPECT_EQ(refusal(example.options, {"a", "b"}), "'b' is not expected; see --help");
   EXPECT_EQ(refusal(example.options, {}), "'file' is missing; see --help");
-  EXPECT_EQ(refusal(example.options, {""}), "'file' is missing; see --help");
+  EXPECT_EQ(refusal(example.options, {""}), "file: the name is empty");
   Options common;
   std::string input;
   common.file("input", input, "FILE.vdb", "The input");

@@ -66,8 +66,8 @@ const std::vector<std::string> small_mask = {"--size", "8"};
 void expectRefusal(const std::string& verb, std::vector<std::string> arguments,
                    const Schema& schema, const std::string& message) {
   if (verb == "halftone") arguments.insert(arguments.end(), small_mask.begin(), small_mask.end());
-  Planned planned(verb, arguments);
-  EXPECT_THAT([&] { planned.filter().plan(schema); }, ThrowsMessage<Error>(HasSubstr(message)));
+  EXPECT_THAT([&] { Planned(verb, arguments).filter().plan(schema); },
+              ThrowsMessage<Error>(HasSubstr(message)));
 }
 
 TEST(Halftone, ListsTheMaterialsOfTheProfile) {
@@ -115,7 +115,7 @@ TEST(Halftone, RefusesWhatItCannotDo) {
   expectRefusal("halftone", {"--icc", "inks.icc"}, schemaWith({"coverage_VeroCyan"}), "--icc: ");
   expectRefusal("halftone", {"--icc", "no such.icc"}, colours, "--icc: no such file 'no such.icc'");
   expectRefusal("halftone", {"--channels", "cyan"}, colours,
-                "--channels: belongs to --icc; leave it out, or give a profile");
+                "--channels: belongs to --icc; leave it out, or give that too");
   expectRefusal("halftone", {"--intent", "saturation"}, colours, "--intent: belongs to --icc; ");
   expectRefusal("separate", {"--black-point", "kept"}, colours, "--black-point: belongs to --icc");
   expectRefusal("halftone", {"--icc", "inks.icc", "--black", "0"}, colours,

@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <regex>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "io/mesh/mesh_writer.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/shapes.h"
 #include "tests/support/told.h"
@@ -97,6 +99,44 @@ TEST_F(Mesh2Sdf, ScalesByUnitFactorAndFit) {
   EXPECT_EQ(plan({"--pitch", "0.1,0.1,0.1", "--unit", "cm", "--place"}).lattice.box.max().x(), 102);
   EXPECT_EQ(plan({"--pitch", "0.1,0.1,0.1", "--scale", "3", "--place"}).lattice.box.max().x(), 32);
   EXPECT_EQ(plan({"--pitch", "0.1,0.1,0.1", "--fit", "4mm", "--place"}).lattice.box.max().x(), 42);
+}
+
+TEST_F(Mesh2Sdf, AUnitIsForFilesThatStateNone) {
+  path_ = (folder_ / "part.glb").string();
+  const Mesh box = test::boxMesh({0, 0, 0}, {1, 1, 1});
+  MeshWriter writer(path_);
+  writer.add(box.vertices, box.triangles, 0);
+  writer.commit();
+  const auto width = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"--pitch", "0.1,0.1,0.1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return plan(arguments).lattice.box.dim().x();
+  };
+  EXPECT_EQ(
+      refusal<UsageError>({"--pitch", "0.1,0.1,0.1", "--unit", "m"}),
+      "--unit: '" + path_ + "' states the unit of its numbers; leave it out, or give --scale");
+  EXPECT_EQ(width({"--unit", "mm"}), width({}));
+  EXPECT_EQ(width({"--unit", "m", "--fit", "1mm"}), width({}));
+  EXPECT_GT(width({"--scale", "2"}), width({}));
+}
+
+TEST_F(Mesh2Sdf, ForeseesTheLeavesOfBandsOfAnyWidth) {
+  writeObj(path_, test::sphereMesh({0, 0, 0}, 2, 24));
+  for (const char* band : {"0.2mm", "0.8mm", "1.9mm", "6mm"}) {
+    const Schema schema = plan({"--pitch", "0.05,0.05,0.05", "--band", band});
+    const auto surface = openvdb::gridConstPtrCast<openvdb::FloatGrid>(
+        source().run(schema.lattice.layers()).at("surface"));
+    std::map<int, double> rows;
+    for (auto leaf = surface->tree().cbeginLeaf(); leaf; ++leaf) ++rows[leaf->origin().z()];
+    const double fullest = std::max_element(rows.begin(), rows.end(), [](auto& a, auto& b) {
+                             return a.second < b.second;
+                           })->second;
+    const auto leaves = static_cast<double>(surface->tree().leafCount());
+    EXPECT_GT(schema.footprint.total, 0.8 * leaves) << band;
+    EXPECT_LT(schema.footprint.total, 1.7 * leaves) << band;
+    EXPECT_GT(schema.footprint.fullest_row, 0.7 * fullest) << band;
+    EXPECT_LT(schema.footprint.fullest_row, 2 * fullest) << band;
+  }
 }
 
 TEST_F(Mesh2Sdf, TurnsAboutXThenYThenZ) {

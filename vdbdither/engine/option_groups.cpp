@@ -18,7 +18,8 @@ constexpr std::array<Choice<Smoothing>, 2> smoothings{
       "mesh in memory"}}};
 
 void declareSize(PlacementOptions& placement, Options& options, const std::string& part) {
-  options.choice("unit", placement.unit, length_units, "Unit of the numbers in the file");
+  options.choice("unit", placement.unit, length_units,
+                 "Unit of the numbers in the file; glTF and 3MF state theirs");
   options.number("scale", placement.scale, scales, "Scales " + part + " about the origin");
 }
 
@@ -95,8 +96,8 @@ void InkOptions::declare(Options& options) {
                "the channels");
   options.choice("intent", intent, intents, "Rendering intent of --icc");
   options.choice("black-point", black_point, black_points, "Black of --icc with --intent relative");
-  options.noteGiven(icc_given, 3);
-  options.onlyIf([this] { return !icc.empty(); }, 3);
+  options.belongTo(
+      "--icc", [this] { return !icc.empty(); }, 3);
 }
 
 void OverwriteOption::declare(Options& options, const std::string& output) {
@@ -126,6 +127,7 @@ void SurfaceGridOption::declare(Options& options) {
 void SmoothingOptions::declare(Options& options) {
   options.choice("smooth", smoothing, smoothings, "Smoothing of the surface");
   options.integer("iterations", iterations, {1, 100000}, "Number of smoothing steps");
+  options.belongTo("--smooth", [this] { return smoothing != Smoothing::none; });
 }
 
 void ViewOptions::declare(Options& options) {

@@ -89,7 +89,6 @@ struct InkOptions {
   Intent intent = Intent::relative;
   BlackPoint black_point = BlackPoint::compensated;
   std::string mixing_given;  ///< `--black` or `--white`, if it is given
-  std::string icc_given;     ///< one that belongs to `--icc`, if it is given
 
   void declare(Options& options);
 };

@@ -432,7 +432,18 @@ void Options::parse(std::span<const std::string> arguments, const Options& commo
   std::vector<Given> all = ArgumentReader(*this, common).read(arguments);
   std::stable_partition(all.begin(), all.end(),
                         [](const Given& given) { return given.option->sets_others; });
-  for (const Given& given : all) take(given);
+  for (const Given& given : all) {
+    // Of a shell variable that is not set, most likely.
+    if (given.option->completion == Option::Completion::file && given.value.empty())
+      throw UsageError(given.option->shown() + ": the name is empty");
+    take(given);
+  }
+  for (const Given& given : all) {
+    const Option& option = *given.option;
+    if (option.applies && !option.applies())
+      throw UsageError(option.shown() + ": belongs to " + option.owner +
+                       "; leave it out, or give that too");
+  }
   for (const Option& option : options_) {
     const bool is_given = std::any_of(all.begin(), all.end(), [&](const Given& given) {
       return given.option == &option && !given.value.empty();
@@ -449,6 +460,15 @@ void Options::noteGiven(std::string& given, std::size_t count) {
       set(text);
       given = shown;
     };
+  }
+}
+
+void Options::belongTo(const std::string& owner, const std::function<bool()>& applies,
+                       std::size_t count) {
+  onlyIf(applies, count);
+  for (Option& option : std::span(options_).last(count)) {
+    option.owner = owner;
+    option.applies = applies;
   }
 }
 

@@ -57,6 +57,8 @@ struct Option {
   /// A positional that takes every remaining word, or an option that may be given several times.
   bool repeated = false;
   bool sets_others = false;                       ///< a preset: read before all others
+  std::string owner;                              ///< how the option that it belongs to is called
+  std::function<bool()> applies;                  ///< whether that one is given; empty: always
   std::function<void(const std::string&)> set;    ///< throws UsageError that says what is accepted
   std::function<std::vector<std::string>()> get;  ///< canonical texts of the present values
 
@@ -173,6 +175,10 @@ class Options {
   /// Makes `given` the name of one of the `count` options declared last, as messages call it, when
   /// it is given.
   void noteGiven(std::string& given, std::size_t count = 1);
+  /// Makes the `count` options declared last part of another, called `owner`: where `applies()`
+  /// does not hold, they have no value, and `parse` refuses them.
+  void belongTo(const std::string& owner, const std::function<bool()>& applies,
+                std::size_t count = 1);
   /// Leaves the `count` options declared last without a value, in the history line too, unless
   /// `applies()`.
   void onlyIf(const std::function<bool()>& applies, std::size_t count = 1);

@@ -32,6 +32,8 @@ struct Mesh {
   /// Of all triangles; null where the file has no colours or they were not asked for. Only readers
   /// set it.
   std::shared_ptr<const Appearance> appearance{};
+  /// Whether the file says what its numbers mean. Then the vertices are mm as they are read.
+  bool states_unit = false;
 };
 
 }  // namespace vdbdither

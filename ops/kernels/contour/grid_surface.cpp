@@ -1,26 +1,16 @@
 #include "ops/kernels/contour/grid_surface.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <string>
 
+#include "ops/kernels/leaf/number_text.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
 
 using openvdb::BoolGrid;
 using openvdb::FloatGrid;
-
-namespace {
-
-std::string numberText(double value) {
-  std::array<char, 32> digits{};
-  return {digits.begin(), std::to_chars(digits.begin(), digits.end(), value).ptr};
-}
-
-}  // namespace
 
 std::string chosenSurfaceGrid(std::span<const std::string> there,
                               const std::optional<std::string>& wanted) {
