@@ -138,7 +138,7 @@ class DracoEncoder : public MeshEncoder {
 
  protected:
   void finish(std::uint64_t vertices, std::uint64_t /*triangles*/) override {
-    encoding_.positions(std::move(positions_));
+    encoding_.positions(std::exchange(positions_, {}));
     if (extras_.colour) encoding_.colours(std::exchange(colours_, {}));
     if (extras_.quality) encoding_.numbers(std::exchange(qualities_, {}));
     file_.append(encoding_.encode(vertices));

@@ -44,7 +44,7 @@ void DracoEncoding::triangle(const Mesh::Triangle& triangle) {
                   draco::PointIndex(triangle[2])});
 }
 
-std::uint32_t DracoEncoding::positions(std::vector<Vec3s> values) {
+std::uint32_t DracoEncoding::positions(const std::vector<Vec3s>& values) {
   openvdb::math::BBox<Vec3s> box;
   for (const Vec3s& position : values) box.expand(position);
   if (!values.empty()) extent_mm_ = double{box.extents()[box.maxExtent()]};

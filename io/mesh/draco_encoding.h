@@ -30,7 +30,7 @@ class DracoEncoding {
   void triangle(const Mesh::Triangle& triangle);
 
   /// Give all points a value each, in mm for positions. Return the id of the attribute in the data.
-  std::uint32_t positions(std::vector<openvdb::Vec3s> values);
+  std::uint32_t positions(const std::vector<openvdb::Vec3s>& values);
   std::uint32_t colours(const std::vector<std::array<std::uint8_t, 3>>& values);
   std::uint32_t colours(const std::vector<std::array<std::uint16_t, 4>>& values);
   std::uint32_t numbers(const std::vector<float>& values);

@@ -74,9 +74,9 @@ void CompressedGlbEncoder::vertex(const MeshVertex& vertex) {
 }
 
 void CompressedGlbEncoder::finish(std::uint64_t vertices, std::uint64_t /*triangles*/) {
-  Json ids{{"POSITION", encoding_.positions(std::move(positions_))}};
-  if (extras_.colour) ids["COLOR_0"] = encoding_.colours(std::move(colours_));
-  if (extras_.quality) ids["_QUALITY"] = encoding_.numbers(std::move(qualities_));
+  Json ids{{"POSITION", encoding_.positions(std::exchange(positions_, {}))}};
+  if (extras_.colour) ids["COLOR_0"] = encoding_.colours(std::exchange(colours_, {}));
+  if (extras_.quality) ids["_QUALITY"] = encoding_.numbers(std::exchange(qualities_, {}));
   const std::string data = encoding_.encode(vertices);
 
   // What a reader gets: Draco splits vertices, drops triangles without area, and rounds positions.
