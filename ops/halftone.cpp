@@ -83,7 +83,7 @@ class HalftoneFilter : public Filter {
 
     const std::vector<std::size_t> order = darkestFirst(set_);
     if (core_.empty()) core_ = set_.inks[order.back()].name;
-    core_material_ = static_cast<std::int32_t>(indexOf("--core", core_)) + 1;
+    core_material_ = materialOf("--core", core_);
     planCoat();
     planParts(in);
     lattice_ = in.lattice;
@@ -161,17 +161,14 @@ class HalftoneFilter : public Filter {
     if (coat_.empty()) return;
     constexpr double thickest_mm = 10;
     const MaterialLayer coat = parseMaterialLayer("--coat", coat_, thickest_mm, "0.1mm:clear");
-    const std::size_t material = indexOf("--coat", coat.material);
-    coat_band_.push_back({coat.thickness_mm, static_cast<std::int32_t>(material) + 1});
+    coat_band_.push_back({coat.thickness_mm, materialOf("--coat", coat.material)});
   }
 
   void planParts(const Schema& in) {
     part_materials_.clear();
     if (parts_.empty()) return;
     for (const std::string& name : commaList(parts_)) {
-      part_materials_.push_back(name == "colours"
-                                    ? keeps_colours
-                                    : static_cast<std::int32_t>(indexOf("--parts", name)) + 1);
+      part_materials_.push_back(name == "colours" ? keeps_colours : materialOf("--parts", name));
     }
     checkPartCount(*findGrid<Int32Grid>(in.grids, part_grid), part_materials_.size(),
                    "have their colours", [this](const std::string& text) { report().warn(text); });
@@ -240,6 +237,11 @@ class HalftoneFilter : public Filter {
     std::string message = option + ": no ink '" + name + "'; there are";
     for (const Material& ink : set_.inks) message += " " + ink.name;
     throw UsageError(message);
+  }
+
+  /// Counted from 1, as the grid counts them.
+  [[nodiscard]] std::int32_t materialOf(const std::string& option, const std::string& name) const {
+    return static_cast<std::int32_t>(indexOf(option, name)) + 1;
   }
 
   /// Out of the user's cache, or new.

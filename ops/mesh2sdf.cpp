@@ -306,6 +306,12 @@ class MeshToSdf : public Source {
         std::min(1.0, std::abs(volumeOf(mesh)) / std::max(held_mm * area_mm2, 1e-300));
     const double corners_mm3 =
         std::numbers::pi * held_mm * held_mm * ((bounds.max - bounds.min).sum() + 4 * held_mm / 3);
+    const auto spread = [&](double leaves, double z_low, double z_high) {
+      const std::size_t first = rowAt(z_low - band_mm);
+      const std::size_t last = rowAt(z_high + band_mm);
+      for (std::size_t row = first; row <= last; ++row)
+        rows[row] += leaves / static_cast<double>(last - first + 1);
+    };
     double across_mm3 = 0;  // swept by leaves that touch the surface
     const auto leavesWithin = [&](double distance_mm, double area, double across) {
       return ((1 + inner_share) * distance_mm * area + across) / leaf_mm.product();
@@ -320,17 +326,11 @@ class MeshToSdf : public Source {
       across_mm3 += across;
       const auto [z_low, z_high] =
           std::minmax({mesh.vertices[t[0]].z(), mesh.vertices[t[1]].z(), mesh.vertices[t[2]].z()});
-      const std::size_t first = rowAt(z_low - band_mm);
-      const std::size_t last = rowAt(z_high + band_mm);
-      for (std::size_t row = first; row <= last; ++row)
-        rows[row] += leavesWithin(held_mm, area, across) / static_cast<double>(last - first + 1);
+      spread(leavesWithin(held_mm, area, across), z_low, z_high);
     }
     const double corner_leaves = corners_mm3 / leaf_mm.product();
-    const std::size_t first = rowAt(bounds.min.z() - band_mm);
-    const std::size_t last = rowAt(bounds.max.z() + band_mm);
     // The middle of a ball is half as large again as its mean.
-    for (std::size_t row = first; row <= last; ++row)
-      rows[row] += 1.5 * corner_leaves / static_cast<double>(last - first + 1);
+    spread(1.5 * corner_leaves, bounds.min.z(), bounds.max.z());
     triangles_per_leaf_ =
         static_cast<double>(mesh.triangles.size()) / leavesWithin(0, area_mm2, across_mm3);
     const double diagonal_mm = lattice.pitch_mm.length();

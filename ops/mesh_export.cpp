@@ -27,6 +27,10 @@ namespace {
 
 using Rgb = std::array<std::uint8_t, 3>;
 
+std::string compressedEndings() {
+  return meshEndings([](const MeshFormat& format) { return format.takes_draco; });
+}
+
 class MeshExport : public Sink {
  public:
   void declare(Options& options) override {
@@ -37,9 +41,8 @@ class MeshExport : public Sink {
                    "material");
     smoothing_.declare(options);
     options.length("draco", draco_mm_, {0, 10},
-                   "Compresses " + meshEndings([](const MeshFormat& format) {
-                     return format.takes_draco;
-                   }) + " by Draco: coordinates are off by up to this length, and of 0 exact",
+                   "Compresses " + compressedEndings() +
+                       " by Draco: coordinates are off by up to this length, and of 0 exact",
                    {"none", "Exact coordinates, and .glb without Draco"});
     overwrite_.declare(options, "the file");
   }
@@ -51,8 +54,7 @@ class MeshExport : public Sink {
     surface_.emplace(in.lattice, *in.grids.at(name_), level_mm_);
     MeshWriter::check(file_, overwrite_.overwrite);
     if (draco_mm_ && !meshFormatNamedBy(file_)->takes_draco)
-      throw UsageError("--draco: '" + file_ + "' is not compressed; name a " +
-                       meshEndings([](const MeshFormat& format) { return format.takes_draco; }) +
+      throw UsageError("--draco: '" + file_ + "' is not compressed; name a " + compressedEndings() +
                        " file, or leave it out");
     leaves_ = in.footprint.at_surface;
     if (in.grids.contains(colour_grid) && meshFormatNamedBy(file_)->holds_extras) {

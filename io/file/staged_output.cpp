@@ -58,18 +58,28 @@ bool isLink(const fs::path& path) {
   return fs::is_symlink(fs::symlink_status(path, none));
 }
 
+/// Whether a path is the name of a descriptor, such as /proc/self/fd/1, which the program may have
+/// pointed elsewhere.
+bool namesDescriptor(const fs::path& path) {
+  std::error_code error;
+  return fs::equivalent(parentOf(path), "/proc/self/fd", error);
+}
+
 /// What `given` names, behind symbolic links. Whether it is there does not matter.
 fs::path destination(const fs::path& given) {
   constexpr int most_links = 40;
   fs::path path = named(given);
-  for (int links = 0; isLink(path); ++links) {
+  for (int links = 0;; ++links) {
+    if (namesDescriptor(path))
+      throw UsageError(quoted(given) +
+                       " stands for an open file of the program; name the file itself");
+    if (!isLink(path)) return path;
     std::error_code error;
     const fs::path next = fs::read_symlink(path, error);
     if (error || links == most_links)
       throw UsageError("cannot write to " + quoted(given) + ": the link leads nowhere");
     path = named(path.parent_path() / next);
   }
-  return path;
 }
 
 /// Renames as renameat2 does, with these flags. Returns whether it worked, or sets errno.
@@ -266,29 +276,11 @@ int flushed(const fs::path& path, int (*flush)(int)) {
   return error == EINVAL || error == ENOTSUP || error == ENOSYS || error == EROFS ? 0 : error;
 }
 
-/// Whether a path leads through a name of a descriptor, such as /dev/stdout, which the program may
-/// have pointed elsewhere.
-bool namesDescriptor(fs::path path) {
-  std::error_code error;
-  const fs::path descriptors = fs::canonical("/proc/self/fd", error);
-  if (error) return false;
-  constexpr int most_links = 40;
-  for (int n = 0; n < most_links; ++n) {
-    if (fs::canonical(parentOf(path), error) == descriptors && !error) return true;
-    const fs::path next = fs::read_symlink(path, error);
-    if (error) return false;
-    path = next.is_absolute() ? next : parentOf(path) / next;
-  }
-  return false;
-}
-
 }  // namespace
 
 void StagedOutput::check(const fs::path& given, Kind kind, bool overwrite) {
-  const std::string name = quoted(given);
-  if (namesDescriptor(given))
-    throw UsageError(name + " stands for an open file of the program; name the file itself");
   const fs::path target = destination(given);
+  const std::string name = quoted(given);
   if (target.empty() || target.filename() == "." || target.filename() == ".." ||
       !target.has_filename()) {
     throw UsageError("cannot write to " + name + ": give a folder or file a name of its own");

@@ -122,19 +122,9 @@ MeshMatch matchDraco(const MeshFile& file) {
   return file.head().starts_with("DRACO") ? MeshMatch::signature : MeshMatch::none;
 }
 
-/// Keeps the mesh: Draco encodes it as a whole.
-class DracoEncoder : public MeshEncoder {
+class DracoEncoder : public DracoMeshEncoder {
  public:
-  DracoEncoder(const std::filesystem::path& path, const MeshEncoding& how)
-      : MeshEncoder(path), extras_(how.extras), encoding_(how.draco_mm.value_or(0)) {}
-
-  void vertex(const MeshVertex& vertex) override {
-    positions_.push_back(vertex.position);
-    if (extras_.colour) colours_.push_back(vertex.colour);
-    if (extras_.quality) qualities_.push_back(vertex.quality);
-  }
-
-  void triangle(const Mesh::Triangle& triangle) override { encoding_.triangle(triangle); }
+  using DracoMeshEncoder::DracoMeshEncoder;
 
  protected:
   void finish(std::uint64_t vertices, std::uint64_t /*triangles*/) override {
@@ -143,13 +133,6 @@ class DracoEncoder : public MeshEncoder {
     if (extras_.quality) encoding_.numbers(std::exchange(qualities_, {}));
     file_.append(encoding_.encode(vertices));
   }
-
- private:
-  VertexExtras extras_;
-  DracoEncoding encoding_;
-  std::vector<openvdb::Vec3s> positions_;
-  std::vector<std::array<std::uint8_t, 3>> colours_;
-  std::vector<float> qualities_;
 };
 
 }  // namespace

@@ -103,14 +103,14 @@ Json glbDocument(const VertexExtras& extras, const GlbMesh& mesh) {
   return document;
 }
 
-std::string glbBeginning(const Json& document, std::uint64_t json_bytes,
+std::string glbBeginning(const std::string& json, std::uint64_t json_bytes,
                          std::uint64_t binary_bytes) {
   std::string text = "glTF";
   append(text, 2);
   append(text, header_bytes + chunk_header_bytes + json_bytes + chunk_header_bytes + binary_bytes);
   append(text, json_bytes);
   text += "JSON";
-  text += document.dump();
+  text += json;
   text.resize(header_bytes + chunk_header_bytes + json_bytes, ' ');
   append(text, binary_bytes);
   text.append("BIN\0", 4);

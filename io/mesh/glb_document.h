@@ -37,8 +37,9 @@ std::array<std::uint16_t, 4> glbColour(const std::array<std::uint8_t, 3>& srgb);
 nlohmann::ordered_json glbDocument(const VertexExtras& extras, const GlbMesh& mesh);
 
 /// Returns the header, the JSON chunk and the header of the binary chunk.
+/// @param json        the text of a document
 /// @param json_bytes  the length of the JSON chunk, a multiple of four; blanks fill it
-std::string glbBeginning(const nlohmann::ordered_json& document, std::uint64_t json_bytes,
+std::string glbBeginning(const std::string& json, std::uint64_t json_bytes,
                          std::uint64_t binary_bytes);
 
 /// Refuses a file whose length cannot be told in 32 bits.

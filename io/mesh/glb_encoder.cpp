@@ -3,7 +3,10 @@
 
 #include "io/mesh/glb_encoder.h"
 
+#include <algorithm>
+#include <array>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -54,7 +57,7 @@ void GlbEncoder::finish(std::uint64_t /*vertices*/, std::uint64_t /*triangles*/)
 
 std::string GlbEncoder::beginning() const {
   return glbBeginning(
-      glbDocument(extras_, mesh_), json_bytes_,
+      glbDocument(extras_, mesh_).dump(), json_bytes_,
       mesh_.vertices * glbVertexBytes(extras_) + mesh_.triangles * sizeof(Mesh::Triangle));
 }
 
@@ -63,19 +66,14 @@ void GlbEncoder::count(std::uint64_t bytes) {
   checkGlbBytes(bytes_);
 }
 
-CompressedGlbEncoder::CompressedGlbEncoder(const std::filesystem::path& path,
-                                           const VertexExtras& extras, double precision_mm)
-    : MeshEncoder(path), extras_(extras), encoding_(precision_mm) {}
-
-void CompressedGlbEncoder::vertex(const MeshVertex& vertex) {
-  positions_.push_back(vertex.position);
-  if (extras_.colour) colours_.push_back(glbColour(vertex.colour));
-  if (extras_.quality) qualities_.push_back(vertex.quality);
-}
-
 void CompressedGlbEncoder::finish(std::uint64_t vertices, std::uint64_t /*triangles*/) {
   Json ids{{"POSITION", encoding_.positions(std::exchange(positions_, {}))}};
-  if (extras_.colour) ids["COLOR_0"] = encoding_.colours(std::exchange(colours_, {}));
+  if (extras_.colour) {
+    std::vector<std::array<std::uint16_t, 4>> linear(colours_.size());
+    std::transform(colours_.begin(), colours_.end(), linear.begin(), glbColour);
+    colours_ = {};
+    ids["COLOR_0"] = encoding_.colours(linear);
+  }
   if (extras_.quality) ids["_QUALITY"] = encoding_.numbers(std::exchange(qualities_, {}));
   const std::string data = encoding_.encode(vertices);
 
@@ -99,12 +97,13 @@ void CompressedGlbEncoder::finish(std::uint64_t vertices, std::uint64_t /*triang
                                                                        {"attributes", ids}};
   document["extensionsUsed"] = document["extensionsRequired"] = Json::array({compression});
 
-  const std::string text =
-      glbBeginning(document, wholeWords(document.dump().size()), wholeWords(data.size()));
-  checkGlbBytes(text.size() + wholeWords(data.size()));
+  const std::string json = document.dump();
+  const std::uint64_t binary_bytes = wholeWords(data.size());
+  const std::string text = glbBeginning(json, wholeWords(json.size()), binary_bytes);
+  checkGlbBytes(text.size() + binary_bytes);
   file_.append(text);
   file_.append(data);
-  file_.append(std::string(wholeWords(data.size()) - data.size(), '\0'));
+  file_.append(std::string(binary_bytes - data.size(), '\0'));
 }
 
 }  // namespace vdbdither

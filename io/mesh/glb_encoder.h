@@ -1,11 +1,8 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
-#include <vector>
 
 #include <openvdb/Types.h>
 
@@ -38,24 +35,13 @@ class GlbEncoder : public IndexedMeshEncoder {
   std::uint64_t bytes_;
 };
 
-/// Writes the same mesh compressed by Draco. It is kept in memory: Draco encodes it as a whole.
-class CompressedGlbEncoder : public MeshEncoder {
+/// Writes the same mesh compressed by Draco.
+class CompressedGlbEncoder : public DracoMeshEncoder {
  public:
-  CompressedGlbEncoder(const std::filesystem::path& path, const VertexExtras& extras,
-                       double precision_mm);
-
-  void vertex(const MeshVertex& vertex) override;
-  void triangle(const Mesh::Triangle& triangle) override { encoding_.triangle(triangle); }
+  using DracoMeshEncoder::DracoMeshEncoder;
 
  protected:
   void finish(std::uint64_t vertices, std::uint64_t triangles) override;
-
- private:
-  VertexExtras extras_;
-  DracoEncoding encoding_;
-  std::vector<openvdb::Vec3s> positions_;
-  std::vector<std::array<std::uint16_t, 4>> colours_;
-  std::vector<float> qualities_;
 };
 
 }  // namespace vdbdither

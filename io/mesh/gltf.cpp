@@ -333,7 +333,7 @@ MeshMatch matchGltf(const MeshFile& file) {
 
 std::unique_ptr<MeshEncoder> makeGlbEncoder(const std::filesystem::path& path,
                                             const MeshEncoding& how) {
-  if (how.draco_mm) return std::make_unique<CompressedGlbEncoder>(path, how.extras, *how.draco_mm);
+  if (how.draco_mm) return std::make_unique<CompressedGlbEncoder>(path, how);
   return std::make_unique<GlbEncoder>(path, how.extras);
 }
 

@@ -26,11 +26,11 @@ Mesh readMesh(const std::filesystem::path& path,
               const std::function<void(const std::string&)>& warn,
               MeshColours colours = MeshColours::skip);
 
+/// The same for a file whose bytes are in memory.
+Mesh parseMesh(const MeshFile& file);
+
 /// Refuses --unit for a mesh whose file states the unit of its numbers. Throws UsageError.
 void checkUnit(const Mesh& mesh, const std::filesystem::path& path,
                const MeshPlacementOptions& placement);
-
-/// The same for a file whose bytes are in memory.
-Mesh parseMesh(const MeshFile& file);
 
 }  // namespace vdbdither

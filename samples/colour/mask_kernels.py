@@ -127,12 +127,17 @@ def lines_of(result):
     return lines
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+def parser_of(text):
+    """Returns a parser for a study of lattices that `text` describes in its first line."""
+    parser = argparse.ArgumentParser(description=text.partition("\n")[0])
     parser.add_argument("--program", type=pathlib.Path, required=True)
     parser.add_argument("--printer", action="append", choices=LATTICES_MM)
     parser.add_argument("--json", type=pathlib.Path)
-    arguments = parser.parse_args()
+    return parser
+
+
+def main():
+    arguments = parser_of(__doc__).parse_args()
     results = {}
     with tempfile.TemporaryDirectory() as folder:
         shape_mask = shape_tile(arguments.program, folder, 1)

@@ -11,15 +11,13 @@ By place, what the eye sees first of a facet is a cut through the mask, or, afte
 mask chose out of two layers. By depth it is one layer of the mask. Figures are those of mask_kernels.py.
 """
 
-import argparse
 import json
-import pathlib
 import tempfile
 
 import numpy as np
 import optics
 from mask_kernels import COUNT, INTERVALS, LENGTHS_MM, MASK_SEEDS, NORMALS, RANDOM_SIZE, REPEATS, SPACING_MM, STEP_MM, STEPS
-from mask_kernels import powers, printed, rays
+from mask_kernels import parser_of, powers, printed, rays
 from tiles import LATTICES_MM, halftone_tile, shape_tile
 
 DEPTH_MM = 0.25
@@ -65,11 +63,8 @@ def study(pitch, tiles, shape, place_count):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--program", type=pathlib.Path, required=True)
-    parser.add_argument("--printer", action="append", choices=LATTICES_MM)
+    parser = parser_of(__doc__)
     parser.add_argument("--places", type=int, default=4, help="places of each facet (%(default)s)")
-    parser.add_argument("--json", type=pathlib.Path)
     arguments = parser.parse_args()
     results = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/number_text.h"
 #include "vdbdither/model/printable.h"
 
 namespace vdbdither {
@@ -111,11 +112,7 @@ double parseLengthMm(std::string_view text, const Range& range) {
   return *length_mm;
 }
 
-std::string shortestText(double value) {
-  std::array<char, 40> buffer{};
-  const auto result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
-  return {buffer.data(), result.ptr};
-}
+std::string shortestText(double value) { return numberText(value); }
 
 std::string quotedForShell(std::string_view word) {
   constexpr std::string_view plain_signs = "_-+=./,:@%";

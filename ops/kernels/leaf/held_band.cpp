@@ -3,8 +3,8 @@
 #include <cmath>
 #include <string>
 
-#include "ops/kernels/leaf/number_text.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/number_text.h"
 
 namespace vdbdither {
 
