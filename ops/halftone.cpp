@@ -12,6 +12,7 @@
 #include "io/profile/material_table.h"
 #include "io/vdb/mask_cache.h"
 #include "ops/kernels/colour/coverage_reader.h"
+#include "ops/kernels/colour/surface_columns.h"
 #include "ops/kernels/leaf/part_values.h"
 #include "ops/kernels/leaf/solid.h"
 #include "ops/kernels/mask/mask_tile.h"
@@ -97,8 +98,14 @@ class HalftoneFilter : public Filter {
   }
 
   [[nodiscard]] std::vector<Read> reads() const override {
-    std::vector<Read> reads{
-        {solid_grid, Reach::stencil(depthReach(coat_band_, lattice_.pitch_mm.z()))}};
+    int solid_layers = depthReach(coat_band_, lattice_.pitch_mm.z());
+    std::vector<Read> reads;
+    if (has_surface_) {
+      const int layers = SurfaceColumns::reachLayers(lattice_.pitch_mm, columnDepthMm());
+      reads.push_back({surface_grid, Reach::stencil(layers)});
+      solid_layers = std::max(solid_layers, layers);
+    }
+    reads.push_back({solid_grid, Reach::stencil(solid_layers)});
     for (const Column& column : columns_) reads.push_back({column.grid, Reach::point()});
     if (!part_materials_.empty()) reads.push_back({part_grid, Reach::point()});
     if (!columns_.empty()) return reads;
@@ -118,11 +125,19 @@ class HalftoneFilter : public Filter {
   [[nodiscard]] Grids run(const Slab& in) const override {
     const auto solid = findGrid<BoolGrid>(in.grids, solid_grid);
     const Int32Grid::Ptr material = makeMaterialGrid(solid->transform());
+    std::optional<SurfaceColumns> places;
+    if (has_surface_)
+      places.emplace(findGrid<FloatGrid>(in.grids, surface_grid)->tree(), solid->tree(),
+                     lattice_.pitch_mm, columnDepthMm(), in.valid);
+    const auto halftoned = [&](const CoverageSource& source) {
+      return halftone_->run(solid->tree(), source, core_material_, in.core,
+                            places ? &*places : nullptr);
+    };
     if (columns_.empty()) {
       const auto colour = findGrid<Vec3SGrid>(in.grids, colour_grid);
       const auto opacity = has_opacity_ ? findGrid<FloatGrid>(in.grids, opacity_grid) : nullptr;
       const ColourCoverages source(*colour, opacity.get(), set_, *separation_);
-      material->setTree(halftone_->run(solid->tree(), source, core_material_, in.core));
+      material->setTree(halftoned(source));
     } else {
       std::vector<FloatGrid::ConstPtr> held;
       std::vector<GridCoverages::Grid> grids;
@@ -131,7 +146,7 @@ class HalftoneFilter : public Filter {
         grids.push_back({held.back().get(), column.grid, column.material});
       }
       const GridCoverages source(std::move(grids), rest_material_);
-      material->setTree(halftone_->run(solid->tree(), source, core_material_, in.core));
+      material->setTree(halftoned(source));
     }
     if (!part_materials_.empty()) {
       const auto part = findGrid<Int32Grid>(in.grids, part_grid);
@@ -155,6 +170,12 @@ class HalftoneFilter : public Filter {
     std::string name;  ///< of the material
     std::size_t material = 0;
   };
+
+  /// As deep as light comes back from, below what lies over the colours.
+  [[nodiscard]] double columnDepthMm() const {
+    constexpr double seen_mm = 0.15;
+    return seen_mm + (coat_band_.empty() ? 0 : coat_band_.front().to_mm);
+  }
 
   void planCoat() {
     coat_band_.clear();
@@ -210,6 +231,8 @@ class HalftoneFilter : public Filter {
           columns_.push_back({name, name.substr(prefix.size())});
     }
     for (const Column& column : columns_) findGrid<FloatGrid>(in.grids, column.grid);
+    has_surface_ = in.grids.contains(surface_grid);
+    if (has_surface_) findGrid<FloatGrid>(in.grids, surface_grid);
     has_opacity_ = columns_.empty() && in.grids.contains(opacity_grid);
     if (has_opacity_) findGrid<FloatGrid>(in.grids, opacity_grid);
     if (!columns_.empty()) return;
@@ -272,6 +295,7 @@ class HalftoneFilter : public Filter {
   int seed_ = 1;
 
   std::vector<Column> columns_;  ///< empty: colours are read
+  bool has_surface_ = false;
   bool has_opacity_ = false;
   InkSet set_;
   std::unique_ptr<Separation> separation_;

@@ -8,6 +8,7 @@
 #include "io/profile/material_table.h"
 #include "io/profile/printer_profile.h"
 #include "tests/support/contract.h"
+#include "tests/support/volumes.h"
 #include "vdbdither/engine/operator.h"
 #include "vdbdither/engine/registry.h"
 #include "vdbdither/model/errors.h"
@@ -231,6 +232,43 @@ TEST(Halftone, ACoatLiesOverTheColours) {
     }
   }
   EXPECT_EQ(test::firstBreach(planned.filter(), in, whole, 8), "");
+}
+
+TEST(Halftone, EveryFlatTopHasTheSamePatternIfThereIsASurface) {
+  constexpr float grey = 0.2F;
+  Schema in = schemaWith({"Cd"});
+  in.lattice.box = CoordBBox(Coord(-8), Coord(50));
+  // A step: tops at 20 and at 41 layers.
+  const auto d = [](const openvdb::Vec3d& at) {
+    const double top_mm = at.x() < 14 * 0.05 ? 20.5 * 0.05 : 41.5 * 0.05;
+    return std::max({at.z() - top_mm, -0.025 - at.z(), -0.025 - at.x(), at.x() - 40.5 * 0.05});
+  };
+  const auto surface = test::sampled(d, in.lattice, 0.3);
+  const auto solid = openvdb::BoolGrid::create(false);
+  const auto colour = Vec3SGrid::create();
+  for (auto ijk = in.lattice.box.begin(); ijk; ++ijk) {
+    if (surface->tree().getValue(*ijk) >= 0) continue;
+    solid->tree().setValueOn(*ijk, true);
+    colour->tree().setValue(*ijk, openvdb::Vec3s(grey));
+  }
+  const auto unlike = [&](const Grids& grids) {
+    for (const auto& [name, grid] : grids) in.grids[name] = grid->copyGridWithNewTree();
+    Planned planned("halftone", {"--size", "16"});
+    planned.filter().plan(in);
+    EXPECT_EQ(test::firstBreach(planned.filter(), in, grids, 8), "");
+    const auto material = openvdb::gridConstPtrCast<Int32Grid>(
+        planned.filter().run({{-8, 51}, {-8, 51}, grids}).at("material"));
+    int count = 0;
+    for (int y = 0; y < 40; ++y)
+      for (int x = 0; x < 12; ++x)
+        count += material->tree().getValue(Coord(x, y, 20)) !=
+                         material->tree().getValue(Coord(x + 16, y, 41))
+                     ? 1
+                     : 0;
+    return count;
+  };
+  EXPECT_GT(unlike({{"solid", solid}, {"Cd", colour}}), 50);
+  EXPECT_EQ(unlike({{"surface", surface}, {"solid", solid}, {"Cd", colour}}), 0);
 }
 
 TEST(Halftone, PartsHaveAMaterialOrTheirColours) {

@@ -8,6 +8,7 @@
 #include <bit>
 #include <memory>
 #include <numeric>
+#include <optional>
 
 #include <tbb/parallel_for.h>
 
@@ -60,7 +61,7 @@ class Intervals {
 }  // namespace
 
 Int32Tree::Ptr Halftone::run(const openvdb::BoolTree& solid, const CoverageSource& source,
-                             std::int32_t bare, ZRange core) const {
+                             std::int32_t bare, ZRange core, const SurfaceColumns* columns) const {
   Int32Tree::Ptr material = valueWhereActive(solid, bare);
   openvdb::CoordBBox box;
   if (!solid.evalActiveVoxelBoundingBox(box)) return material;
@@ -77,18 +78,25 @@ Int32Tree::Ptr Halftone::run(const openvdb::BoolTree& solid, const CoverageSourc
   material->getNodes(leaves);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size()), [&](const auto& range) {
     const auto reader = source.reader();
+    std::optional<SurfaceColumns::Reader> places;
+    if (columns) places.emplace(*columns);
     std::vector<float> coverages(order_.size());
     Intervals intervals;
     std::array<float, leaf_layers> thresholds;
     for (std::size_t n = range.begin(); n != range.end(); ++n) {
       Int32Leaf& leaf = *leaves[n];
       if (!reader->visit(leaf.origin())) continue;
+      const bool has_columns = places && places->visit(leaf.origin());
       std::int32_t* values = leaf.buffer().data();
       for (unsigned column = 0; column < Int32Leaf::SIZE; column += leaf_layers) {
         unsigned layers = leaf.getValueMask().getWord<std::uint8_t>(column / leaf_layers);
         if (layers != 0) layers &= reader->layersWith(column);
         if (layers == 0) continue;
         mask_.column(leaf.offsetToGlobalCoord(column), thresholds);
+        if (has_columns && places->rowHasColumns(column)) {
+          for (unsigned z = 0; z < leaf_layers; ++z)
+            if (places->isInColumn(column + z)) thresholds[z] = mask_(places->place(column + z));
+        }
         while (layers != 0) {
           const unsigned alike = reader->read(column, layers, coverages);
           intervals.set(order_, coverages);

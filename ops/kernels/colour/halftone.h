@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "ops/kernels/colour/coverage_reader.h"
+#include "ops/kernels/colour/surface_columns.h"
 #include "ops/kernels/mask/threshold_mask.h"
 #include "vdbdither/model/lattice.h"
 #include "vdbdither/model/openvdb.h"
@@ -26,11 +27,14 @@ class Halftone {
 
   /// Returns the material, counted from 1, of every voxel of `solid` in the layers `core`; 0
   /// elsewhere.
-  /// @param source  of the coverages
-  /// @param bare    the material of voxels without coverages, counted from 1
+  /// @param source   of the coverages
+  /// @param bare     the material of voxels without coverages, counted from 1
+  /// @param columns  whose voxels have the thresholds of their places in them, or null: the mask
+  ///                 then repeats with the lattice alone
   [[nodiscard]] openvdb::Int32Tree::Ptr run(const openvdb::BoolTree& solid,
                                             const CoverageSource& source, std::int32_t bare,
-                                            ZRange core) const;
+                                            ZRange core,
+                                            const SurfaceColumns* columns = nullptr) const;
 
   [[nodiscard]] double memoryBytes() const { return static_cast<double>(mask_.bytes()); }
 

@@ -12,4 +12,14 @@ inline LeafBits trueBits(const openvdb::BoolTree::LeafNodeType& leaf) {
   return bits;
 }
 
+/// The same of the leaf of `solid` at `origin`, or of the tile in its place.
+inline LeafBits trueBits(const openvdb::tree::ValueAccessor<const openvdb::BoolTree, false>& solid,
+                         const openvdb::Coord& origin) {
+  if (const auto* leaf = solid.probeConstLeaf(origin)) return trueBits(*leaf);
+  bool value = false;
+  LeafBits bits;
+  bits.fill(solid.probeValue(origin, value) && value ? ~std::uint64_t{0} : 0);
+  return bits;
+}
+
 }  // namespace vdbdither

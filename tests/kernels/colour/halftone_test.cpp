@@ -10,6 +10,7 @@
 
 #include "ops/kernels/colour/ink_separation.h"
 #include "ops/kernels/mask/mask_tile.h"
+#include "tests/support/volumes.h"
 #include "vdbdither/model/errors.h"
 
 namespace vdbdither {
@@ -20,6 +21,7 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::Int32Tree;
+using openvdb::Vec3d;
 using testing::ThrowsMessage;
 
 InkSet inks() {
@@ -137,6 +139,33 @@ TEST(Halftone, TheDarkestInksAreThoseBelowAThreshold) {
     const std::int32_t wanted = mask(*ijk) < 0.2F ? 4 : mask(*ijk) < 0.5F ? 5 : 1;
     ASSERT_EQ(material->getValue(*ijk), wanted);
   }
+}
+
+TEST(Halftone, ThresholdsBelowTheSurfaceAreThoseOfPlacesInColumns) {
+  const ThresholdMask mask = smallMask(Coord(8, 8, 16));
+  const openvdb::Vec3d pitch_mm(0.042, 0.084, 0.014);
+  const Lattice lattice = test::latticeAround(pitch_mm, Vec3d(0.6), 0.2);
+  const auto surface = test::sampled(test::sphere(Vec3d(0.01, 0, 0), 0.5), lattice, 0.3);
+  BoolTree solid(false);
+  for (auto ijk = lattice.box.begin(); ijk; ++ijk)
+    if (surface->tree().getValue(*ijk) < 0) solid.setValueOn(*ijk, true);
+  const SurfaceColumns columns(surface->tree(), solid, pitch_mm, 0.15, all);
+  SurfaceColumns::Reader places(columns);
+  const auto black = constant(lattice.box, 0.4F);
+  const auto white = constant(lattice.box, 0.6F);
+  const GridCoverages source({{white.get(), "white", 0}, {black.get(), "black", 3}}, std::nullopt);
+  const auto material = Halftone(darkestFirst(inks()), mask).run(solid, source, 1, all, &columns);
+  int counted = 0;
+  for (auto voxel = solid.cbeginValueOn(); voxel; ++voxel) {
+    const Coord ijk = voxel.getCoord();
+    places.visit(ijk & ~7);
+    const unsigned offset = BoolTree::LeafNodeType::coordToOffset(ijk);
+    const bool counts = places.isInColumn(offset);
+    counted += counts ? 1 : 0;
+    const float threshold = mask(counts ? places.place(offset) : ijk);
+    ASSERT_EQ(material->getValue(ijk), threshold < 0.4F ? 4 : 1) << ijk;
+  }
+  EXPECT_GT(counted, 1000);
 }
 
 TEST(Halftone, WhatIsNotOpaqueIsClear) {
