@@ -1,11 +1,11 @@
 #!/usr/bin/python3
-"""Compares two ways to read the mask of `halftone` near the surface, on flat facets.
+"""Compares two ways to read a mask near the surface, on flat facets.
 
     samples/colour/surface_thresholds.py --program build/release/vdbdither [--printer NAME]... [--places N] [--json FILE]
 
-by place   the threshold of a voxel depends on its place on the lattice, as in the program
+by place   the threshold of a voxel depends on its place on the lattice
 by depth   a column of voxels along the axis that the normal is closest to counts its voxels from the printed surface: within
-           DEPTH_MM the count takes the place of the index along that axis
+           DEPTH_MM the count takes the place of the index along that axis, as in `halftone`
 
 By place, what the eye sees first of a facet is a cut through the mask, or, after the dither of the shape, voxels that another
 mask chose out of two layers. By depth it is one layer of the mask. Figures are those of mask_kernels.py.
@@ -20,7 +20,7 @@ from mask_kernels import COUNT, INTERVALS, LENGTHS_MM, MASK_SEEDS, NORMALS, RAND
 from mask_kernels import parser_of, powers, printed, rays
 from tiles import LATTICES_MM, halftone_tile, shape_tile
 
-DEPTH_MM = 0.25
+DEPTH_MM = 0.15
 WAYS = ("by place", "by depth")
 
 
