@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <tbb/blocked_range.h>
@@ -188,9 +189,10 @@ LeafBits SurfaceColumns::Reader::beginnings(unsigned direction, const Coord& ori
 bool SurfaceColumns::Reader::visit(const Coord& origin) {
   origin_ = origin;
   codes_.fill(0);
-  depths_mm_.fill(std::numeric_limits<double>::infinity());
+  has_depths_ = false;
   for (unsigned direction = 0; direction < directions; ++direction) follow(direction);
-  return std::any_of(codes_.begin(), codes_.end(), [](std::uint8_t code) { return code != 0; });
+  return has_depths_ &&
+         std::any_of(codes_.begin(), codes_.end(), [](std::uint8_t code) { return code != 0; });
 }
 
 /// Follows the columns of one direction from their beginnings, in the leaf or in those before it,
@@ -207,6 +209,7 @@ void SurfaceColumns::Reader::follow(unsigned direction) {
     any = any || !isEmpty(begin[static_cast<std::size_t>(n)]);
   }
   if (!any) return;
+  if (!std::exchange(has_depths_, true)) depths_mm_.fill(std::numeric_limits<double>::infinity());
 
   // By place, the voxels of the plane that have it.
   std::array<std::uint64_t, maximum_length> places{};

@@ -76,6 +76,7 @@ class SurfaceColumns::Reader {
   openvdb::Coord origin_;
   std::array<std::uint8_t, 512> codes_{};  ///< 0, or 1 + direction + 6 · place
   std::array<double, 512> depths_mm_{};    ///< from the voxel where the column begins
+  bool has_depths_ = false;                ///< whether depths_mm_ are those of this leaf
 };
 
 }  // namespace vdbdither
