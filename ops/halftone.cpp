@@ -23,6 +23,7 @@
 #include "vdbdither/model/errors.h"
 #include "vdbdither/model/find_grid.h"
 #include "vdbdither/model/known_grids.h"
+#include "vdbdither/model/layers.h"
 #include "vdbdither/model/openvdb.h"
 
 namespace vdbdither {
@@ -129,8 +130,11 @@ class HalftoneFilter : public Filter {
     if (has_surface_)
       places.emplace(findGrid<FloatGrid>(in.grids, surface_grid)->tree(), solid->tree(),
                      lattice_.pitch_mm, columnDepthMm(), in.valid);
+    // Without the halo, which the result would have to be cut at.
+    const GridLayers with_halo{solid, in.valid};
+    const auto core = openvdb::gridConstPtrCast<BoolGrid>(joinLayers({&with_halo, 1}, in.core));
     const auto halftoned = [&](const CoverageSource& source) {
-      return halftone_->run(solid->tree(), source, core_material_, in.core,
+      return halftone_->run(core->tree(), source, core_material_, in.core,
                             places ? &*places : nullptr);
     };
     if (columns_.empty()) {
