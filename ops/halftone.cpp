@@ -49,7 +49,7 @@ class HalftoneFilter : public Filter {
                  "Material of voxels without a colour; by default the lightest ink");
     options.text("coat", coat_, "LENGTH:NAME",
                  "Material over the colours, down to this depth below the printed surface, such as "
-                 "0.1mm:clear");
+                 "0.1mm:VeroClear");
     options.text("parts", parts_, "NAME,...",
                  "A material for each part, in the order of the meshes; 'colours' for a part that "
                  "is printed in its colours");
@@ -185,7 +185,7 @@ class HalftoneFilter : public Filter {
     coat_band_.clear();
     if (coat_.empty()) return;
     constexpr double thickest_mm = 10;
-    const MaterialLayer coat = parseMaterialLayer("--coat", coat_, thickest_mm, "0.1mm:clear");
+    const MaterialLayer coat = parseMaterialLayer("--coat", coat_, thickest_mm, "0.1mm:VeroClear");
     coat_band_.push_back({coat.thickness_mm, materialOf("--coat", coat.material)});
   }
 

@@ -2,6 +2,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <initializer_list>
 #include <mutex>
 
 #include "ops/kernels/mask/gradient_noise.h"
@@ -66,11 +67,19 @@ class Mask : public Source {
     options.triple("sigma", sigma_, "S|SX,SY,SZ", {0.3, 16},
                    "Standard deviation of the Gaussian of void-and-cluster, or length of decay of "
                    "exponential, along x, y and z, in voxels");
+    options.belongTo(
+        "--kind void-and-cluster", [this] { return kind_ == Kind::void_and_cluster; }, 2);
     options.number("plane-sigma", plane_sigma_, {0.3, 16},
                    "Standard deviation in the lattice planes of axis-mix, in voxels");
+    options.belongTo("--kernel axis-mix",
+                     [this] { return hasKernel({MaskKernel::Shape::axis_mix}); });
     options.number("space-weight", space_weight_, {0, 1e6},
                    "Weight of space in axis-mix and exponential");
+    options.belongTo("--kernel axis-mix or exponential", [this] {
+      return hasKernel({MaskKernel::Shape::axis_mix, MaskKernel::Shape::exponential});
+    });
     options.integer("cell", cell_, {2, 128}, "Edge of the cells of gradient-noise, in voxels");
+    options.belongTo("--kind gradient-noise", [this] { return kind_ == Kind::gradient_noise; });
     options.integer("seed", seed_, {0, std::numeric_limits<int>::max()},
                     "Seed of the random start");
   }
@@ -118,6 +127,10 @@ class Mask : public Source {
   }
 
  private:
+  [[nodiscard]] bool hasKernel(std::initializer_list<MaskKernel::Shape> shapes) const {
+    return kind_ == Kind::void_and_cluster && std::ranges::count(shapes, kernel_) > 0;
+  }
+
   [[nodiscard]] double voxels() const {
     return static_cast<double>(size_.x()) * size_.y() * size_.z();
   }

@@ -23,8 +23,9 @@ def make_tile(program, folder, size, seed, kernel, sigma, weight=2):
     """Returns the thresholds [x, y, z] of a new mask. sigma: voxels [3]. Raises SystemExit with the words of the program."""
     path = pathlib.Path(folder) / "tile.vdb"
     command = [str(program), "mask", "--size", ",".join(map(str, size)), "--seed", str(seed), "--kernel", kernel, "--sigma",
-               ",".join(repr(float(length)) for length in sigma), "--space-weight", f"{weight:g}", "-o", str(path), "--overwrite",
-               "--quiet"]
+               ",".join(repr(float(length)) for length in sigma), "-o", str(path), "--overwrite", "--quiet"]
+    if kernel in ("axis-mix", "exponential"):
+        command += ["--space-weight", f"{weight:g}"]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         raise SystemExit(f"tiles: {' '.join(command[1:])}\n{done.stderr.strip()}")

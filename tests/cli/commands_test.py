@@ -282,8 +282,8 @@ class Refusals(ProgramTest):
         chain = ("mesh2sdf", "part.stl", *MIMAKI, "-o", "x.vdb")
         for text in ("5", "5:5", "9:2", "0:99999", "-1:4", "a:b", "1:2:3"):
             self.refuse(2, "is not A:B with 0 <= A < B <= ", *chain, f"--layers={text}")
-        for text in ("0", "7", "-8", "many", "8x"):
-            self.refuse(2, f"--slab: '{text}' is not accepted; the value must be a multiple of 8, auto or all", *chain, f"--slab={text}")
+        for text in ("0", "7", "-8", "many", "8x", "1000000000"):
+            self.refuse(2, f"--slab: '{text}' is not accepted; the value must be a multiple of 8 up to 1048576, auto or all", *chain, f"--slab={text}")
         for text in ("much", "-4GiB", "4 apples", "0", "inf", "1e400GiB"):
             self.refuse(2, f"--memory: '{text}' is not accepted; give a size such as 4GiB or 500MB, or auto", *chain, f"--memory={text}")
 

@@ -99,7 +99,7 @@ TEST(Halftone, RefusesWhatItCannotDo) {
   expectRefusal("halftone", {"--core", "yellow"}, colours,
                 "--core: no ink 'yellow'; there are VeroPureWht VeroBlack VeroClear VeroCyan");
   expectRefusal("halftone", {"--coat", "clear"}, colours,
-                "--coat: 'clear' must be a thickness and a material, as in 0.1mm:clear");
+                "--coat: 'clear' must be a thickness and a material, as in 0.1mm:VeroClear");
   expectRefusal("halftone", {"--coat", "thick:VeroClear"}, colours, "--coat: 'thick' ");
   expectRefusal("halftone", {"--coat", "1mm:glass"}, colours, "--coat: no ink 'glass'; there are");
   expectRefusal("halftone", {"--rest", "VeroPureWht"}, colours,

@@ -182,6 +182,16 @@ TEST(Mask, ImpossibleSizesAndSigmasAreRefusedBeforeWork) {
             "--sigma: '0.2' is not accepted; the value must be one number or three, separated by "
             "commas, each from 0.3 to 16");
   EXPECT_EQ(refusal({"--size", "8"}), "accepted");
+  EXPECT_EQ(refusal({"--size", "8", "--kind", "white", "--sigma", "2"}),
+            "--sigma: belongs to --kind void-and-cluster; leave it out, or give that too");
+  EXPECT_EQ(refusal({"--size", "8", "--kernel", "gauss", "--plane-sigma", "2"}),
+            "--plane-sigma: belongs to --kernel axis-mix; leave it out, or give that too");
+  EXPECT_EQ(refusal({"--size", "8", "--space-weight", "2"}),
+            "--space-weight: belongs to --kernel axis-mix or exponential; leave it out, or give "
+            "that too");
+  EXPECT_EQ(refusal({"--size", "8", "--kernel", "exponential", "--space-weight", "2"}), "accepted");
+  EXPECT_EQ(refusal({"--size", "8", "--cell", "2"}),
+            "--cell: belongs to --kind gradient-noise; leave it out, or give that too");
 }
 
 class Stopping : public Reporter {

@@ -17,8 +17,10 @@ namespace {
 /// `text` itself. Throws UsageError unless it is auto, all, or a multiple of the layers of a leaf.
 std::string checkedSlab(const std::string& text) {
   if (text == "auto" || text == "all") return text;
-  const std::string wanted = "a multiple of 8, auto or all";
-  const double layers = parseNumber(text, {leaf_layers, 1 << 20}, wanted);
+  constexpr int most_layers = 1 << 20;
+  const std::string wanted =
+      "a multiple of 8 up to " + std::to_string(most_layers) + ", auto or all";
+  const double layers = parseNumber(text, {leaf_layers, most_layers}, wanted);
   if (std::fmod(layers, leaf_layers) != 0)
     throw UsageError("'" + text + "' is not accepted; the value must be " + wanted);
   return std::to_string(static_cast<int>(layers));
