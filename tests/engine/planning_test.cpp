@@ -126,10 +126,9 @@ TEST(Planning, TheHistoryHasALineForEverySourceAndFilter) {
 TEST(Planning, RefusesWhatCannotBe) {
   EXPECT_THAT(planning("numbers ! keep --layers 4:17"),
               ThrowsMessage<UsageError>("--layers: '4:17' is not A:B with 0 <= A < B <= 16"));
-  EXPECT_THAT(
-      planning("numbers ! keep --slab 12"),
-      ThrowsMessage<UsageError>(
-          "keep: --slab: '12' is not accepted; the value must be a multiple of 8 up to 1048576, auto or all"));
+  EXPECT_THAT(planning("numbers ! keep --slab 12"),
+              ThrowsMessage<UsageError>("keep: --slab: '12' is not accepted; the value must be a "
+                                        "multiple of 8 up to 1048576, auto or all"));
   EXPECT_THAT(
       planning("numbers ! write nowhere.vdb --stream"),
       ThrowsMessage<UsageError>("write: needs the whole volume at once, which --stream forbids"));
