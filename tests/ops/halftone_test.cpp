@@ -237,11 +237,11 @@ TEST(Halftone, ACoatLiesOverTheColours) {
 TEST(Halftone, EveryFlatTopHasTheSamePatternIfThereIsASurface) {
   constexpr float grey = 0.2F;
   Schema in = schemaWith({"Cd"});
-  in.lattice.box = CoordBBox(Coord(-8), Coord(50));
+  in.lattice.box = CoordBBox(Coord(-8), Coord(60));
   // A step: tops at 20 and at 41 layers.
   const auto d = [](const openvdb::Vec3d& at) {
-    const double top_mm = at.x() < 14 * 0.05 ? 20.5 * 0.05 : 41.5 * 0.05;
-    return std::max({at.z() - top_mm, -0.025 - at.z(), -0.025 - at.x(), at.x() - 40.5 * 0.05});
+    const double top_mm = at.x() < 23.5 * 0.05 ? 20.5 * 0.05 : 41.5 * 0.05;
+    return std::max({at.z() - top_mm, -0.025 - at.z(), -0.025 - at.x(), at.x() - 54.5 * 0.05});
   };
   const auto surface = test::sampled(d, in.lattice, 0.3);
   const auto solid = openvdb::BoolGrid::create(false);
@@ -251,24 +251,32 @@ TEST(Halftone, EveryFlatTopHasTheSamePatternIfThereIsASurface) {
     solid->tree().setValueOn(*ijk, true);
     colour->tree().setValue(*ijk, openvdb::Vec3s(grey));
   }
-  const auto unlike = [&](const Grids& grids) {
+  // Voxels `depth` layers below one top that differ from those below the other.
+  const auto unlike = [&](const Grids& grids, int depth, const std::string& coat) {
     for (const auto& [name, grid] : grids) in.grids[name] = grid->copyGridWithNewTree();
-    Planned planned("halftone", {"--size", "16"});
+    std::vector<std::string> arguments{"--size", "16"};
+    if (!coat.empty()) arguments.insert(arguments.end(), {"--coat", coat});
+    Planned planned("halftone", arguments);
     planned.filter().plan(in);
     EXPECT_EQ(test::firstBreach(planned.filter(), in, grids, 8), "");
     const auto material = openvdb::gridConstPtrCast<Int32Grid>(
-        planned.filter().run({{-8, 51}, {-8, 51}, grids}).at("material"));
+        planned.filter().run({{-8, 61}, {-8, 61}, grids}).at("material"));
     int count = 0;
-    for (int y = 0; y < 40; ++y)
-      for (int x = 0; x < 12; ++x)
-        count += material->tree().getValue(Coord(x, y, 20)) !=
-                         material->tree().getValue(Coord(x + 16, y, 41))
+    for (int y = 8; y < 40; ++y)
+      for (int x = 9; x < 14; ++x)
+        count += material->tree().getValue(Coord(x, y, 20 - depth)) !=
+                         material->tree().getValue(Coord(x + 32, y, 41 - depth))
                      ? 1
                      : 0;
     return count;
   };
-  EXPECT_GT(unlike({{"solid", solid}, {"Cd", colour}}), 50);
-  EXPECT_EQ(unlike({{"surface", surface}, {"solid", solid}, {"Cd", colour}}), 0);
+  EXPECT_GT(unlike({{"solid", solid}, {"Cd", colour}}, 0, ""), 20);
+  const Grids grids{{"surface", surface}, {"solid", solid}, {"Cd", colour}};
+  for (int depth = 0; depth < 3; ++depth) EXPECT_EQ(unlike(grids, depth, ""), 0) << depth;
+  EXPECT_GT(unlike(grids, 5, ""), 20);
+  // A coat of four layers lies over as many layers of columns.
+  for (int depth = 0; depth < 7; ++depth)
+    EXPECT_EQ(unlike(grids, depth, "0.2mm:VeroClear"), 0) << depth;
 }
 
 TEST(Halftone, PartsHaveAMaterialOrTheirColours) {

@@ -219,7 +219,7 @@ void SurfaceColumns::Reader::follow(unsigned direction) {
     for (unsigned step = 0; step < leaf_layers; ++step) {
       const unsigned at = outwardOf(direction) > 0 ? leaf_layers - 1 - step : step;
       const std::uint64_t beginning = planeOf(of_leaf, axis, at);
-      const std::uint64_t following = planeOf(solid, axis, at) & ~beginning;
+      const std::uint64_t following = planeOf(solid, axis, at);
       for (int place = length - 1; place > 0; --place)
         places[static_cast<std::size_t>(place)] =
             places[static_cast<std::size_t>(place - 1)] & following;

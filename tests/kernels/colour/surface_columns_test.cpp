@@ -234,6 +234,26 @@ TEST(SurfaceColumns, DependOnNoLayersBeyondTheirReach) {
   }
 }
 
+TEST(SurfaceColumns, HaveAtMost42Voxels) {
+  const Vec3d pitch_mm(0.002);
+  const Part part(test::box(Vec3d(0.0), Vec3d(0.1, 0.1, 0.2)), pitch_mm, Vec3d(0.1, 0.1, 0.2),
+                  false);
+  EXPECT_EQ(SurfaceColumns::reachLayers(pitch_mm, depth_mm), 42);
+  const SurfaceColumns columns(part.surface->tree(), part.solid->tree(), pitch_mm, depth_mm,
+                               layersOf(part));
+  const int top = part.solid->evalActiveVoxelBoundingBox().max().z();
+  SurfaceColumns::Reader reader(columns);
+  for (int depth = 0; depth < 45; ++depth) {
+    const Coord ijk(0, 0, top - depth);
+    reader.visit(ijk & ~7);
+    const unsigned offset = openvdb::BoolTree::LeafNodeType::coordToOffset(ijk);
+    ASSERT_EQ(reader.isInColumn(offset), depth < 42) << depth;
+    if (depth < 42) {
+      EXPECT_EQ(reader.place(offset), Coord(0, 0, -depth));
+    }
+  }
+}
+
 TEST(SurfaceColumns, BetweenTwoAxesAllRunAlongOne) {
   // Edges at 45 degrees, with the rounding of single precision in their normals.
   const Part part(test::box(Vec3d(0.01, 0, 0.003), Vec3d(0.8, 2, 0.8), Vec3d(0, 45, 0)),
