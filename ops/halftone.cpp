@@ -120,7 +120,8 @@ class HalftoneFilter : public Filter {
   }
 
   [[nodiscard]] std::optional<Work> work() const override {
-    return Work{.us_per_surface_leaf = cost::halftone_us};
+    return Work{.us_per_surface_leaf =
+                    cost::halftone_us + (has_surface_ ? cost::halftone_columns_us : 0)};
   }
 
   [[nodiscard]] Grids run(const Slab& in) const override {

@@ -38,6 +38,7 @@ inline constexpr double dither_us = 6;
 inline constexpr double dither_own_normals_us = 3;
 inline constexpr double dither_plain_us = 2;  ///< without displacement
 inline constexpr double halftone_us = 12;
+inline constexpr double halftone_columns_us = 8;  ///< thresholds that follow the surface
 inline constexpr double hollow_us = 6;
 inline constexpr double info_us = 2;
 inline constexpr double interlace_us = 1.6;
