@@ -91,10 +91,6 @@ unsigned offsetOf(unsigned bit, int axis, unsigned at) {
   }
 }
 
-bool isEmpty(const LeafBits& bits) {
-  return std::all_of(bits.begin(), bits.end(), [](std::uint64_t word) { return word == 0; });
-}
-
 /// Returns the direction of the axis that a normal is closest to, or none of the zero vector.
 /// Between two axes, where the rounding of a normal would choose, it is the last one.
 unsigned directionOf(const openvdb::Vec3s& normal, unsigned none) {
@@ -104,16 +100,6 @@ unsigned directionOf(const openvdb::Vec3s& normal, unsigned none) {
     if (std::abs(normal[other]) * closer >= std::abs(normal[axis])) axis = other;
   if (normal[axis] == 0) return none;
   return static_cast<unsigned>(2 * axis) + (normal[axis] < 0 ? 1U : 0U);
-}
-
-using Solid = openvdb::tree::ValueAccessor<const openvdb::BoolTree, false>;
-
-/// Returns the printed voxels of a leaf that lie in the layers `valid`.
-LeafBits printedBits(const Solid& solid, const Coord& origin, ZRange valid) {
-  LeafBits bits = trueBits(solid, origin);
-  const std::uint64_t within = everyRow(rowWithin(origin.z(), valid));
-  for (std::uint64_t& word : bits) word &= within;
-  return bits;
 }
 
 Coord beside(const Coord& origin, unsigned direction, int leaves) {
@@ -137,24 +123,24 @@ SurfaceColumns::SurfaceColumns(const openvdb::FloatTree& surface, const openvdb:
   const std::vector<const FloatLeaf*> leaves = leavesIn(surface, valid);
   std::vector<std::array<std::unique_ptr<MaskLeaf>, directions>> made(leaves.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size()), [&](const auto& range) {
-    const Solid printed(solid);
+    const openvdb::tree::ValueAccessor<const openvdb::BoolTree, false> printed(solid);
     LeafNormals normals(surface, pitch_mm, valid);
     for (std::size_t n = range.begin(); n != range.end(); ++n) {
       const FloatLeaf& leaf = *leaves[n];
-      const LeafBits inside = printedBits(printed, leaf.origin(), valid);
-      if (isEmpty(inside)) continue;
+      const LeafBits inside = trueBits(printed, leaf.origin(), valid);
+      if (inside == no_bits) continue;
       const LeafBits known = activeBits(leaf, rowWithin(leaf.origin().z(), valid));
       std::array<LeafBits, directions> open;
       LeafBits wanted{};
       for (unsigned direction = 0; direction < directions; ++direction) {
         const LeafBits outer = neighbours(
-            inside, printedBits(printed, beside(leaf.origin(), direction, 1), valid), direction);
+            inside, trueBits(printed, beside(leaf.origin(), direction, 1), valid), direction);
         for (unsigned x = 0; x < 8; ++x) {
           open[direction][x] = inside[x] & ~outer[x] & known[x];
           wanted[x] |= open[direction][x];
         }
       }
-      if (isEmpty(wanted)) continue;
+      if (wanted == no_bits) continue;
       normals.visit(leaf, wanted);
       forEachBit(wanted, [&](unsigned offset) {
         const unsigned direction = directionOf(normals.normal(offset), directions);
@@ -201,21 +187,20 @@ void SurfaceColumns::Reader::follow(unsigned direction) {
   const int axis = axisOf(direction);
   const int length = columns_.lengths_[static_cast<std::size_t>(axis)];
   const double pitch_mm = columns_.pitch_mm_[axis];
-  const int before = leavesBefore(length);
   std::array<LeafBits, leavesBefore(maximum_length) + 1> begin;
-  bool any = false;
-  for (int n = 0; n <= before; ++n) {
+  int first = -1;  // the outermost leaf that holds beginnings
+  for (int n = 0; n <= leavesBefore(length); ++n) {
     begin[static_cast<std::size_t>(n)] = beginnings(direction, beside(origin_, direction, n));
-    any = any || !isEmpty(begin[static_cast<std::size_t>(n)]);
+    if (begin[static_cast<std::size_t>(n)] != no_bits) first = n;
   }
-  if (!any) return;
+  if (first < 0) return;
   if (!std::exchange(has_depths_, true)) depths_mm_.fill(std::numeric_limits<double>::infinity());
 
   // By place, the voxels of the plane that have it.
   std::array<std::uint64_t, maximum_length> places{};
-  for (int n = before; n >= 0; --n) {
+  for (int n = first; n >= 0; --n) {
     const LeafBits& of_leaf = begin[static_cast<std::size_t>(n)];
-    const LeafBits solid = printedBits(solid_, beside(origin_, direction, n), columns_.valid_);
+    const LeafBits solid = trueBits(solid_, beside(origin_, direction, n), columns_.valid_);
     for (unsigned step = 0; step < leaf_layers; ++step) {
       const unsigned at = outwardOf(direction) > 0 ? leaf_layers - 1 - step : step;
       const std::uint64_t beginning = planeOf(of_leaf, axis, at);

@@ -176,13 +176,9 @@ class RefinedBlock {
 };
 
 /// Takes over which voxels of `solid` are printed.
-void begin(OpenLeaf& leaf, openvdb::tree::ValueAccessor<const openvdb::BoolTree, false>& solid) {
-  const Coord origin = leaf.origin;
-  if (const auto* there = solid.probeConstLeaf(origin)) {
-    leaf.printed = trueBits(*there);
-  } else {
-    leaf.printed.fill(solid.getValue(origin) ? ~std::uint64_t{0} : 0);
-  }
+void begin(OpenLeaf& leaf,
+           const openvdb::tree::ValueAccessor<const openvdb::BoolTree, false>& solid) {
+  leaf.printed = trueBits(solid, leaf.origin);
   leaf.forEachOpen([&](unsigned offset, OpenVoxel& open) {
     open.setPrinted(bitAt(leaf.printed, offset), bitAt(leaf.free, offset));
   });

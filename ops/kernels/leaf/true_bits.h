@@ -22,4 +22,14 @@ inline LeafBits trueBits(const openvdb::tree::ValueAccessor<const openvdb::BoolT
   return bits;
 }
 
+/// The same of those in the layers `valid`.
+inline LeafBits trueBits(const openvdb::tree::ValueAccessor<const openvdb::BoolTree, false>& solid,
+                         const openvdb::Coord& origin, ZRange valid) {
+  const std::uint8_t row = rowWithin(origin.z(), valid);
+  if (row == 0) return no_bits;
+  LeafBits bits = trueBits(solid, origin);
+  for (std::uint64_t& word : bits) word &= everyRow(row);
+  return bits;
+}
+
 }  // namespace vdbdither

@@ -19,6 +19,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "ops/kernels/leaf/true_bits.h"
+
 namespace vdbdither {
 
 namespace {
@@ -33,12 +35,6 @@ static_assert(plane == edge * edge);
 constexpr int volume = edge * edge * edge;
 constexpr float infinite = std::numeric_limits<float>::infinity();
 
-/// The solid voxels of a leaf, per x a word of 8·y + z.
-using LeafBits = std::array<std::uint64_t, edge>;
-
-bool none(const LeafBits& bits) {
-  return std::all_of(bits.begin(), bits.end(), [](std::uint64_t word) { return word == 0; });
-}
 bool all(const LeafBits& bits) {
   return std::all_of(bits.begin(), bits.end(), [](std::uint64_t word) { return ~word == 0; });
 }
@@ -93,7 +89,7 @@ class StripTransform {
   StripTransform(const openvdb::BoolGrid& solid, const openvdb::Vec3d& pitch_mm,
                  const openvdb::CoordBBox& region, ZRange valid, std::span<const DepthBand> bands,
                  std::int32_t beneath)
-      : accessor_(solid.getConstAccessor()),
+      : accessor_(solid.tree()),
         valid_(valid),
         bands_(bands),
         beneath_(beneath),
@@ -127,7 +123,7 @@ class StripTransform {
         index += (branch_edge - (origin.x() & (branch_edge - 1))) / edge;
         continue;
       }
-      if (const LeafBits bits = bitsAt(origin); !none(bits)) {
+      if (const LeafBits bits = bitsAt(origin); bits != no_bits) {
         out.push_back(makeOutput(index, origin, bits));
       }
       ++index;
@@ -163,20 +159,7 @@ class StripTransform {
   }
 
   [[nodiscard]] LeafBits bitsAt(const Coord& origin) const {
-    LeafBits bits{};
-    const ZRange here = intersection({origin.z(), origin.z() + edge}, valid_);
-    if (here.empty()) return bits;
-    const std::uint64_t layers = (255U >> (edge - here.size())) << (here.begin - origin.z());
-    const std::uint64_t counting = layers * 0x0101010101010101U;
-    if (const auto* leaf = accessor_.probeConstLeaf(origin)) {
-      const std::uint64_t* values = leaf->buffer().data();
-      for (int x = 0; x < edge; ++x) {
-        bits[x] = leaf->getValueMask().getWord<openvdb::Index64>(x) & values[x] & counting;
-      }
-    } else if (bool value = false; accessor_.probeValue(origin, value) && value) {
-      bits.fill(counting);
-    }
-    return bits;
+    return trueBits(accessor_, origin, valid_);
   }
 
   /// Returns the number of consecutive solid voxels above (or below) each column of the block, up
@@ -191,7 +174,7 @@ class StripTransform {
         for (int column = 0; column < plane; ++column) count[column] += open[column] ? edge : 0;
         continue;
       }
-      if (none(bits)) break;
+      if (bits == no_bits) break;
       bool any_open = false;
       for (int column = 0; column < plane; ++column) {
         if (!open[column]) continue;
@@ -211,7 +194,7 @@ class StripTransform {
     Block& block = row(origin.y()).blocks[index + blocksWithinReach(0)];
     if (block.state != Block::State::unknown) return block;
     const LeafBits bits = bitsAt(origin);
-    if (none(bits)) {
+    if (bits == no_bits) {
       block.state = Block::State::zero;
       return block;
     }
@@ -336,7 +319,7 @@ class StripTransform {
     return beneath_;
   }
 
-  openvdb::BoolGrid::ConstAccessor accessor_;
+  openvdb::tree::ValueAccessor<const BoolTree, false> accessor_;
   ZRange valid_;
   std::span<const DepthBand> bands_;
   std::int32_t beneath_;

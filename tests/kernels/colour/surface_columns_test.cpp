@@ -140,15 +140,11 @@ void forEachVoxel(const Part& part, const SurfaceColumns& columns, ZRange layers
       }
 }
 
-ZRange layersOf(const Part& part) {
-  return {part.lattice.box.min().z(), part.lattice.box.max().z() + 1};
-}
-
 /// Draws the places along z in columns of z, or along x in those of x, of a slice of a part across
 /// y: `.` where nothing is printed, `o` in no column.
 std::string drawn(const Part& part, int axis) {
   const SurfaceColumns columns(part.surface->tree(), part.solid->tree(), part.lattice.pitch_mm,
-                               depth_mm, layersOf(part));
+                               depth_mm, part.lattice.layers());
   std::ostringstream picture;
   const openvdb::CoordBBox printed = part.solid->evalActiveVoxelBoundingBox();
   SurfaceColumns::Reader reader(columns);
@@ -205,7 +201,7 @@ TEST(SurfaceColumns, AreThoseOfTheDefinition) {
     for (const test::TestShape& shape : test::testShapes()) {
       SCOPED_TRACE(shape.name);
       const Part part(shape.distance, pitch_mm, shape.extent_mm, true);
-      const ZRange valid = layersOf(part);
+      const ZRange valid = part.lattice.layers();
       const SurfaceColumns columns(part.surface->tree(), part.solid->tree(), pitch_mm, depth_mm,
                                    valid);
       const Reference reference(part, valid);
@@ -223,11 +219,11 @@ TEST(SurfaceColumns, DependOnNoLayersBeyondTheirReach) {
   const test::TestShape& shape = test::testShapes().front();
   const Part part(shape.distance, pitch_mm, shape.extent_mm, true);
   const int reach = SurfaceColumns::reachLayers(pitch_mm, depth_mm);
-  for (const ZRange core : test::slabsOf(layersOf(part), 16)) {
-    const ZRange valid = grownWithin(core, reach, layersOf(part));
+  for (const ZRange core : test::slabsOf(part.lattice.layers(), 16)) {
+    const ZRange valid = grownWithin(core, reach, part.lattice.layers());
     const SurfaceColumns columns(part.surface->tree(), part.solid->tree(), pitch_mm, depth_mm,
                                  valid);
-    const Reference reference(part, layersOf(part));
+    const Reference reference(part, part.lattice.layers());
     forEachVoxel(part, columns, core, [&](const Coord& ijk, std::optional<Coord> place) {
       ASSERT_EQ(place, reference.place(ijk)) << ijk;
     });
@@ -240,7 +236,7 @@ TEST(SurfaceColumns, HaveAtMost42Voxels) {
                   false);
   EXPECT_EQ(SurfaceColumns::reachLayers(pitch_mm, depth_mm), 42);
   const SurfaceColumns columns(part.surface->tree(), part.solid->tree(), pitch_mm, depth_mm,
-                               layersOf(part));
+                               part.lattice.layers());
   const int top = part.solid->evalActiveVoxelBoundingBox().max().z();
   SurfaceColumns::Reader reader(columns);
   for (int depth = 0; depth < 45; ++depth) {
@@ -259,13 +255,14 @@ TEST(SurfaceColumns, BetweenTwoAxesAllRunAlongOne) {
   const Part part(test::box(Vec3d(0.01, 0, 0.003), Vec3d(0.8, 2, 0.8), Vec3d(0, 45, 0)),
                   Vec3d(0.05), Vec3d(1.2, 0.3, 1.2), false);
   const SurfaceColumns columns(part.surface->tree(), part.solid->tree(), part.lattice.pitch_mm,
-                               depth_mm, layersOf(part));
+                               depth_mm, part.lattice.layers());
   int counted = 0;
-  forEachVoxel(part, columns, layersOf(part), [&](const Coord& ijk, std::optional<Coord> place) {
-    if (!place || std::abs(ijk.x()) < 4 || std::abs(ijk.z()) < 4) return;
-    EXPECT_EQ(place->x(), ijk.x()) << ijk;
-    ++counted;
-  });
+  forEachVoxel(part, columns, part.lattice.layers(),
+               [&](const Coord& ijk, std::optional<Coord> place) {
+                 if (!place || std::abs(ijk.x()) < 4 || std::abs(ijk.z()) < 4) return;
+                 EXPECT_EQ(place->x(), ijk.x()) << ijk;
+                 ++counted;
+               });
   EXPECT_GT(counted, 1000);
 }
 
