@@ -19,7 +19,7 @@ MIMAKI = ("--printer", "mimaki-3duj-553")
 
 def start_program(test, *arguments, **keywords):
     """Starts a run of `test`, and returns when it notes signals. Signals are as at a terminal."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
     def restore():
         for number in numbers:
