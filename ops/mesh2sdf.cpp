@@ -290,9 +290,14 @@ class MeshToSdf : public Source {
     const Vec3d leaf_mm = lattice.pitch_mm * double{leaf_layers};
     const double low = lattice.layers().begin * lattice.pitch_mm.z();
     const double band_mm = band_.maximumMm(lattice.pitch_mm);
+    const MeshBounds bounds = boundsOf(mesh);
+    const Vec3d size_mm = bounds.max - bounds.min;
+    // Nothing lies deeper than half of the thickness of the part.
+    const double depth_mm =
+        std::min(colour_depth_mm_, 0.5 * std::min({size_mm.x(), size_mm.y(), size_mm.z()}));
     // On each side of the surface, on average.
     const double held_mm =
-        colour_ ? std::max(band_mm, 0.5 * (colour_depth_mm_ + lattice.diagonalMm())) : band_mm;
+        colour_ ? std::max(band_mm, 0.5 * (depth_mm + lattice.diagonalMm())) : band_mm;
     const int top_row = lattice.layers().size() / leaf_layers + 1;
     std::vector<double> rows(static_cast<std::size_t>(top_row) + 1, 0.0);
     const auto rowAt = [&](double z_mm) {
@@ -300,12 +305,11 @@ class MeshToSdf : public Source {
           std::clamp((z_mm - low) / leaf_mm.z(), 0.0, static_cast<double>(top_row)));
     };
     // A wide band reaches the middle of the part, and grows around it as a ball does.
-    const MeshBounds bounds = boundsOf(mesh);
     const double area_mm2 = areaOf(mesh);
     const double inner_share =
         std::min(1.0, std::abs(volumeOf(mesh)) / std::max(held_mm * area_mm2, 1e-300));
     const double corners_mm3 =
-        std::numbers::pi * held_mm * held_mm * ((bounds.max - bounds.min).sum() + 4 * held_mm / 3);
+        std::numbers::pi * held_mm * held_mm * (size_mm.sum() + 4 * held_mm / 3);
     const auto spread = [&](double leaves, double z_low, double z_high) {
       const std::size_t first = rowAt(z_low - band_mm);
       const std::size_t last = rowAt(z_high + band_mm);

@@ -12,6 +12,7 @@ using openvdb::Vec4f;
 namespace {
 
 constexpr double byte_unit = 255;
+constexpr double word_unit = 65535;
 constexpr float opaque = 1e30F;  // whatever the unit
 
 float valueOrZero(double value) {
@@ -37,6 +38,12 @@ void EncodedColours::add(const std::array<double, 3>& colour, double opacity) {
 void EncodedColours::decode(const MeshFile& file, const std::string& what) {
   if (unit_ == 1 && greatest_ > 1) {
     file.warn("colours of " + what + " go beyond 1; they are read as 0 to 255");
+    unit_ = byte_unit;
+  } else if (unit_ == byte_unit && greatest_ > byte_unit) {
+    file.warn("colours of " + what + " go beyond 255; they are read as 0 to 65535");
+    unit_ = word_unit;
+  } else if (unit_ == word_unit && greatest_ > 0 && greatest_ <= byte_unit) {
+    file.warn("colours of " + what + " do not go beyond 255; they are read as 0 to 255");
     unit_ = byte_unit;
   } else if (unit_ == byte_unit) {
     for (Vec4f& colour : colours_) {

@@ -14,7 +14,8 @@ namespace vdbdither {
 /// Colours as a file has them, by vertex or face: red, green, blue as sRGB and the opacity.
 class EncodedColours {
  public:
-  /// @param unit  the value that means 1: of bytes 255, of reals 1
+  /// @param unit  the value that means 1: of bytes and long integers 255, of short ones 65535, of
+  ///              reals 1
   explicit EncodedColours(double unit = 1) : unit_(unit) {}
 
   [[nodiscard]] bool isEmpty() const { return colours_.empty(); }
@@ -32,7 +33,8 @@ class EncodedColours {
   void add(const std::array<double, 3>& colour);
   void add(const std::array<double, 3>& colour, double opacity);
 
-  /// Makes linear light of them. Reals of which one is beyond 1 count as 0 to 255, with a warning.
+  /// Makes linear light of them. Where the unit does not fit the greatest value, they count as 0 to
+  /// 255 or to 65535, with a warning: reals beyond 1, long integers beyond 255, short ones below.
   /// @param what  "vertices"
   void decode(const MeshFile& file, const std::string& what);
 

@@ -291,7 +291,6 @@ class GltfReader {
     tell(omissions.morph_targets, "ignored the morph targets of ", " primitives");
     tell(boneless_, "ignored the bones of ", " primitives without weights for them");
     tell(scene.hidden, "left out ", " meshes that are hidden (KHR_node_visibility)");
-    tell(scene.repeated, "read once each: ", " nodes that EXT_mesh_gpu_instancing repeats");
     tell(omissions.missing_coordinates, "ignored the textures of ",
          " primitives without texture coordinates");
     tell(omissions.wild_coordinates, "took 0 for ",

@@ -129,13 +129,14 @@ class Walk {
   }
 
   void addInstance(const GltfValue& node, const Mat4d& to_world) {
+    if (node["extensions"].has("EXT_mesh_gpu_instancing"))
+      node.refuse("is repeated by EXT_mesh_gpu_instancing, which is not read");
     const std::uint64_t mesh = node["mesh"].count();
     const std::string_view name =
         node["name"].text().empty() ? root_["meshes"].at(mesh)["name"].text() : node["name"].text();
     GltfInstance instance{mesh, std::string(name), to_world, std::nullopt};
     if (node.has("skin")) instance.skin = node["skin"].count();
     scene_.instances.push_back(std::move(instance));
-    scene_.repeated += node["extensions"].has("EXT_mesh_gpu_instancing") ? 1 : 0;
   }
 
   GltfValue root_;

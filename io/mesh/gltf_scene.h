@@ -23,13 +23,12 @@ struct GltfInstance {
 struct GltfScene {
   std::vector<GltfInstance> instances;  ///< a node before its children, in the order of the file
   std::map<std::uint64_t, openvdb::Mat4d> to_world;  ///< of every node that is reached
-  std::uint64_t repeated = 0;  ///< nodes that EXT_mesh_gpu_instancing would draw several times
-  std::uint64_t hidden = 0;    ///< meshes that KHR_node_visibility does not show
+  std::uint64_t hidden = 0;  ///< meshes that KHR_node_visibility does not show
 };
 
 /// Walks through the default scene, through all scenes where none is the default, and through all
 /// nodes where there are no scenes. Refuses nodes that are reached twice, such as cycles, and trees
-/// of more than 64 levels.
+/// of more than 64 levels, and nodes that EXT_mesh_gpu_instancing repeats.
 GltfScene readGltfScene(const GltfValue& root);
 
 }  // namespace vdbdither

@@ -16,6 +16,8 @@ namespace vdbdither {
 
 namespace {
 
+constexpr const char* colour_numbers = "three numbers from 0 to 1";
+
 double share(double value) {
   if (!(value > 0)) return 0;
   return value < 1 ? value : 1;
@@ -24,7 +26,7 @@ double share(double value) {
 class MtlParser {
  public:
   MtlParser(const MeshFile& file, std::string_view text, const std::string& shown)
-      : file_(file), shown_(shown), text_(text) {}
+      : file_(file), shown_(shown), all_(text), text_(text) {}
 
   std::vector<MtlMaterial> parse() {
     constexpr std::size_t lines_per_look = 1 << 16;
@@ -32,7 +34,8 @@ class MtlParser {
       if (++line % lines_per_look == 0) throwIfInterrupted();
       readStatement(text_.word());
     }
-    finishMaterial();
+    scaleBytes();
+    whitenTextured();
     if (!passed_over_.empty()) {
       std::string list;
       for (const std::string& word : passed_over_) list += (list.empty() ? "" : ", ") + word;
@@ -49,7 +52,6 @@ class MtlParser {
  private:
   void readStatement(std::string_view statement) {
     if (equalsIgnoringCase(statement, "newmtl")) {
-      finishMaterial();
       materials_.push_back({});
       materials_.back().name = mtlName(text_.line());
       has_dissolve_ = false;
@@ -61,8 +63,8 @@ class MtlParser {
     } else if (equalsIgnoringCase(statement, "d")) {
       readDissolve();
     } else if (equalsIgnoringCase(statement, "tr")) {
-      const auto value = text_.number();
-      if (value && !has_dissolve_) materials_.back().opacity = 1 - share(*value);
+      const double transparency = share(number("Tr", "one number from 0 to 1"));
+      if (!has_dissolve_) materials_.back().opacity = 1 - transparency;
     } else if (equalsIgnoringCase(statement, "map_kd")) {
       readMap();
     } else if (equalsIgnoringCase(statement, "map_d")) {
@@ -72,26 +74,49 @@ class MtlParser {
 
   /// Green and blue are as red where they are left out.
   void readDiffuse() {
-    const auto red = text_.number();
-    if (!red) {
-      const std::string_view word = text_.word();
-      if (word == "spectral" || word == "xyz") passed_over_.insert("Kd " + std::string(word));
+    TextCursor ahead = text_;
+    if (const std::string_view word = ahead.word(); word == "spectral" || word == "xyz") {
+      passed_over_.insert("Kd " + std::string(word));
       return;
     }
-    const auto green = text_.number();
-    const auto blue = green ? text_.number() : green;
-    materials_.back().diffuse = {share(*red), share(green.value_or(*red)),
-                                 share(blue.value_or(*red))};
+    std::array<double, 3>& diffuse = materials_.back().diffuse;
+    diffuse[0] = number("Kd", colour_numbers);
+    diffuse[1] = diffuse[2] = diffuse[0];
+    for (std::size_t i = 1; i < 3; ++i) {
+      ahead = text_;
+      if (const std::string_view word = ahead.word(); word.empty() || word.starts_with('#')) break;
+      diffuse[i] = number("Kd", colour_numbers);
+    }
+    for (const double value : diffuse) greatest_ = std::max(greatest_, value);
   }
 
   /// Comes before Tr, wherever the two stand.
   void readDissolve() {
     TextCursor ahead = text_;
     if (ahead.word() == "-halo") text_ = ahead;
-    if (const auto value = text_.number()) {
-      materials_.back().opacity = share(*value);
-      has_dissolve_ = true;
-    }
+    materials_.back().opacity = share(number("d", "one number from 0 to 1"));
+    has_dissolve_ = true;
+  }
+
+  /// @param wanted  what the statement must have
+  double number(const std::string& statement, const std::string& wanted) {
+    TextCursor ahead = text_;
+    if (const auto value = text_.number(); value && *value >= 0 && std::isfinite(*value))
+      return *value;
+    const std::string_view word = ahead.word();
+    const auto line = 1 + std::count(all_.data(), text_.position(), '\n');
+    file_.refuse(shown_ + ", line " + std::to_string(line) + ": " + statement + " needs " + wanted +
+                 ", not " + (word.empty() ? "nothing" : inQuotes(word)) +
+                 "; repair the line or export again");
+  }
+
+  /// Some exporters write bytes. A value slightly above 1 is an overbright colour.
+  void scaleBytes() {
+    constexpr double least_byte = 2;
+    const bool has_bytes = greatest_ > least_byte;
+    if (has_bytes) file_.warn(shown_ + ": Kd goes beyond 1; it is read as 0 to 255");
+    for (MtlMaterial& material : materials_)
+      for (double& value : material.diffuse) value = share(has_bytes ? value / 255 : value);
   }
 
   void readMap() {
@@ -105,10 +130,8 @@ class MtlParser {
       if (!option.starts_with('-') || !readOption(option, ahead, material)) break;
       text_ = ahead;
     }
-    std::string_view path = mtlName(text_.line());
-    if (path.size() > 1 && path.front() == '"' && path.back() == '"')
-      path = path.substr(1, path.size() - 2);
-    material.texture = path;
+    material.texture = unquoted(mtlName(text_.line()));
+    if (material.texture.empty()) passed_over_.insert("map_Kd without the name of a file");
   }
 
   /// Whether `option` is one; then `text` is behind its arguments.
@@ -148,19 +171,21 @@ class MtlParser {
   }
 
   /// Some exporters write black where the texture alone is the colour.
-  void finishMaterial() {
-    if (materials_.empty()) return;
-    MtlMaterial& material = materials_.back();
-    if (material.texture.empty() || material.diffuse != std::array<double, 3>{}) return;
-    material.diffuse = {1, 1, 1};
-    if (black_++ == 0) first_black_ = material.name;
+  void whitenTextured() {
+    for (MtlMaterial& material : materials_) {
+      if (material.texture.empty() || material.diffuse != std::array<double, 3>{}) continue;
+      material.diffuse = {1, 1, 1};
+      if (black_++ == 0) first_black_ = material.name;
+    }
   }
 
   const MeshFile& file_;
   const std::string& shown_;
+  std::string_view all_;
   TextCursor text_;
   std::vector<MtlMaterial> materials_;
   bool has_dissolve_ = false;
+  double greatest_ = 0;
   std::set<std::string> passed_over_;
   std::size_t black_ = 0;
   std::string first_black_;
@@ -172,6 +197,11 @@ std::vector<MtlMaterial> parseMtl(const MeshFile& file, std::string_view text,
                                   const std::string& shown) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   return MtlParser(file, text, shown).parse();
+}
+
+std::string_view unquoted(std::string_view name) {
+  const bool is_quoted = name.size() > 1 && name.front() == '"' && name.back() == '"';
+  return is_quoted ? name.substr(1, name.size() - 2) : name;
 }
 
 std::string_view mtlName(std::string_view line) {

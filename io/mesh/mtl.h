@@ -20,7 +20,8 @@ struct MtlMaterial {
   bool is_clamped = false;
 };
 
-/// Parses a library of materials. What cannot be read is passed over with a warning of `file`.
+/// Parses a library of materials. What it does not know is passed over with a warning of `file`.
+/// Throws DataError for colours and opacities that are no numbers from 0 up.
 /// @param text   the library
 /// @param shown  what messages call it
 std::vector<MtlMaterial> parseMtl(const MeshFile& file, std::string_view text,
@@ -29,5 +30,8 @@ std::vector<MtlMaterial> parseMtl(const MeshFile& file, std::string_view text,
 /// Returns a name that goes on to the end of its line, without blanks around it and without a
 /// comment: '#' begins one at the start or behind a blank.
 std::string_view mtlName(std::string_view line);
+
+/// Returns a name without the quotes around it.
+std::string_view unquoted(std::string_view name);
 
 }  // namespace vdbdither

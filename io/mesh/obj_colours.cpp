@@ -105,7 +105,7 @@ bool ObjColours::hasCoordinates(std::size_t triangle, const std::string& texture
 
 void ObjColours::readLibraries() {
   std::set<std::string_view> named;
-  for (const std::string_view line : libraries_) readNamedLibraries(mtlName(line), named);
+  for (const std::string_view line : libraries_) readNamedLibraries(unquoted(mtlName(line)), named);
   if (missing_libraries_ == 1) {
     file_.warn("the material library " + inQuotes(first_missing_library_) +
                " is not in the folder of the mesh; its materials are white");

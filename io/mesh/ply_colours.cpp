@@ -9,6 +9,7 @@
 
 #include "io/mesh/mesh_textures.h"
 #include "vdbdither/model/interrupt.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -72,8 +73,12 @@ PlyColours::Slot PlyColours::slotOf(const PlyProperty& property) {
                                                       {"texture_v", Slot::v},
                                                       {"texture_s", Slot::u},
                                                       {"texture_t", Slot::v},
+                                                      {"texcoord_u", Slot::u},
+                                                      {"texcoord_v", Slot::v},
+                                                      {"texcoord_s", Slot::u},
+                                                      {"texcoord_t", Slot::v},
                                                       {"texnumber", Slot::texture}};
-  const auto found = slots.find(property.name);
+  const auto found = slots.find(lowerCase(property.name));
   return found == slots.end() ? Slot::none : found->second;
 }
 
@@ -93,7 +98,7 @@ void PlyColours::begin(const PlyElement& element) {
   }
   has_colours_ = hasSlot(Slot::red) && hasSlot(Slot::green) && hasSlot(Slot::blue);
   has_opacity_ = has_colours_ && hasSlot(Slot::opacity);
-  has_coordinates_ = hasSlot(Slot::u) && hasSlot(Slot::v) && !texture_files_.empty();
+  has_coordinates_ = hasSlot(Slot::u) && hasSlot(Slot::v);
   record_ = {};
 }
 
@@ -128,7 +133,7 @@ void PlyColours::endVertex() {
 
 void PlyColours::endFace(std::span<const Mesh::Triangle> places, std::size_t corners,
                          std::size_t triangles) {
-  const bool has_list = list_.size() == 2 * corners && !texture_files_.empty();
+  const bool has_list = list_.size() == 2 * corners && !list_.empty();
   const double number = record_[static_cast<std::size_t>(Slot::texture)];
   const bool is_known = number >= 0 && number < static_cast<double>(texture_files_.size()) &&
                         number == std::floor(number);
@@ -156,11 +161,11 @@ std::optional<Appearance::Coordinates> PlyColours::coordinatesOf(const Mesh& mes
 }
 
 std::shared_ptr<const Appearance> PlyColours::finish(const Mesh& mesh) {
-  const bool has_textures =
-      !texture_files_.empty() && (!corners_.empty() || !vertex_coordinates_.empty());
+  const bool has_coordinates = !corners_.empty() || !vertex_coordinates_.empty();
+  const bool has_textures = !texture_files_.empty() && has_coordinates;
   if (!texture_files_.empty() && !has_textures)
     file_.warn("names a texture, but has no texture coordinates; the texture is not read");
-  if (!has_textures && !vertex_colours_ && !face_colours_) return nullptr;
+  if (!has_coordinates && !vertex_colours_ && !face_colours_) return nullptr;
   if (vertex_colours_) vertex_colours_->decode(file_, "vertices");
   if (face_colours_) face_colours_->decode(file_, "faces");
 
@@ -180,13 +185,17 @@ std::shared_ptr<const Appearance> PlyColours::finish(const Mesh& mesh) {
   };
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (t % triangles_per_look == 0) throwIfInterrupted();
-    const auto coordinates = has_textures && texture_[t] != no_texture
+    const bool is_textured = has_textures && texture_[t] != no_texture;
+    // Without a texture that the file names, the user may give one.
+    const auto coordinates = is_textured || texture_files_.empty()
                                  ? coordinatesOf(mesh, t)
                                  : std::optional<Appearance::Coordinates>();
     if (coordinates) {
-      appearance->material[t] = materialOf(texture_[t]);
       appearance->coordinates.resize(mesh.triangles.size());
       appearance->coordinates[t] = *coordinates;
+    }
+    if (coordinates && is_textured) {
+      appearance->material[t] = materialOf(texture_[t]);
       continue;
     }
     if (has_textures) ++lost_textures_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "io/mesh/text_cursor.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -102,7 +103,7 @@ class HeaderParser {
   }
 
   void parseComment() {
-    if (text_.word() != "TextureFile") return;
+    if (!equalsIgnoringCase(text_.word(), "texturefile")) return;
     text_.skipBlanks();
     std::string_view name = text_.line();
     while (name.ends_with(' ') || name.ends_with('\t')) name.remove_suffix(1);

@@ -8,6 +8,7 @@
 #include "io/file/file_name.h"
 #include "io/file/whole_file.h"
 #include "vdbdither/model/errors.h"
+#include "vdbdither/model/words.h"
 
 namespace vdbdither {
 
@@ -25,6 +26,21 @@ std::string normalized(std::string_view path) {
   return absolute ? "/" + relative : relative;
 }
 
+/// The only entry of its folder that has this name but for upper and lower case, which some systems
+/// do not tell apart.
+std::optional<fs::path> inOtherCase(const fs::path& path) {
+  const std::string name = lowerCase(path.filename().string());
+  std::error_code error;
+  std::optional<fs::path> found;
+  for (fs::directory_iterator entry(path.parent_path(), error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (!equalsIgnoringCase(entry->path().filename().string(), name)) continue;
+    if (found) return std::nullopt;
+    found = entry->path();
+  }
+  return found;
+}
+
 /// Returns the file's real path if it exists, and whether it lies in `folder`.
 struct Found {
   fs::path path;
@@ -32,8 +48,13 @@ struct Found {
 };
 std::optional<Found> find(const fs::path& folder, const std::string& name) {
   std::error_code error;
-  const fs::path path = fs::canonical(folder / name, error);
-  if (error) return std::nullopt;
+  fs::path path = fs::canonical(folder / name, error);
+  if (error) {
+    const auto other = inOtherCase(folder / name);
+    if (!other) return std::nullopt;
+    path = fs::canonical(*other, error);
+    if (error) return std::nullopt;
+  }
   const fs::path real_folder = fs::canonical(folder, error);
   if (error) return std::nullopt;
   const auto [end, rest] =

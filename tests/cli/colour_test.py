@@ -105,6 +105,21 @@ class Colours(ProgramTest):
             expected = [min(z, 10 - z) * 0.1 < deepest for z in range(11)]
             self.assertEqual(coloured, expected)
 
+    def test_a_depth_beyond_the_part_needs_no_more_memory(self):
+        said = [self.succeed("mesh2sdf", "part.obj", *PITCH, "--colour", "--colour-depth", depth, "-o", "out.vdb", "--explain")
+                for depth in ("0.5mm", "1000mm")]
+        memory = [next(line for line in text.splitlines() if line.startswith(b"memory")) for text in said]
+        self.assertEqual(memory[0], memory[1])
+
+    def test_a_ply_takes_a_texture_that_it_does_not_name(self):
+        vertices = "".join(f"{x} {y} {z} {x / 4} {y / 4}\n" for z in (0, 1) for y in (0, 4) for x in (0, 4))
+        (self.folder / "part.ply").write_text(
+            "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nproperty float s\n"
+            "property float t\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n" + vertices
+            + "4 4 5 7 6\n4 0 2 3 1\n4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n")
+        self.succeed("mesh2sdf", "part.ply", *PITCH, "--colour", "--texture", "letter.png", "-o", "colour.vdb")
+        self.assert_letter("colour.vdb")
+
     def test_colours_pass_through_other_operators(self):
         self.succeed("mesh2sdf", "part.obj", *PITCH, "--colour", "!", "normals", "!", "dither", "-o", "solid.vdb")
         self.assert_letter("solid.vdb")

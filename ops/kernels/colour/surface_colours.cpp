@@ -117,8 +117,12 @@ Vec4f SurfaceColours::at(std::uint32_t triangle, const Vec3d& p_mm) const {
   const std::uint32_t within = triangle - source.first;
   const SurfaceMaterial& material = appearance.materials[appearance.material[within]];
   const bool textured = material.texture != SurfaceMaterial::no_texture;
+  const auto cut = [&](Vec4f colour) {
+    if (material.opacity_cutoff > 0) colour.w() = colour.w() >= material.opacity_cutoff ? 1 : 0;
+    return colour;
+  };
   Vec4f colour = material.colour;
-  if (!textured && appearance.colours.empty()) return colour;
+  if (!textured && appearance.colours.empty()) return cut(colour);
 
   const Vec3d& a = vertices_[triangles_[triangle][0]];
   const Vec3d& b = vertices_[triangles_[triangle][1]];
@@ -134,8 +138,7 @@ Vec4f SurfaceColours::at(std::uint32_t triangle, const Vec3d& p_mm) const {
     texel.w() = opacity;
     colour *= texel;
   }
-  if (material.opacity_cutoff > 0) colour.w() = colour.w() >= material.opacity_cutoff ? 1 : 0;
-  return colour;
+  return cut(colour);
 }
 
 double SurfaceColours::memoryBytes() const {

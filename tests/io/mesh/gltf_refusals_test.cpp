@@ -49,6 +49,10 @@ TEST(GltfRefusals, ExtensionsThatItNeedsByName) {
             }),
             "'part': needs the extension 'EXT_mesh_gpu_instancing', which is not read; export it "
             "without");
+  EXPECT_EQ(refusalAfter([](Json& json) {
+              json["nodes"][0]["extensions"] = {{"EXT_mesh_gpu_instancing", Json::object()}};
+            }),
+            "'part': nodes[0] is repeated by EXT_mesh_gpu_instancing, which is not read" + again);
   EXPECT_EQ(refusalAfter([](Json& json) { json["extensionsRequired"] = {"A\x1B[31m"}; }),
             "'part': needs the extension 'A?[31m', which is not read; export it without");
 }

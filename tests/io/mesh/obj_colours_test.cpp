@@ -80,13 +80,47 @@ TEST_F(ObjColoursTest, TellsBytesFromSharesAndWeightsFromColours) {
 TEST_F(ObjColoursTest, ReadsKdAndOpacity) {
   EXPECT_EQ(only("Kd 0.5 0.25 1\n").colour, light(0.5, 0.25, 1));
   EXPECT_EQ(only("Kd 0.5\n").colour, light(0.5, 0.5, 0.5));
-  EXPECT_EQ(only("kd 0.5 7 -1\n").colour, light(0.5, 1, 0));
+  EXPECT_EQ(only("kd 0.5 1.5 0 # red\n").colour, light(0.5, 1, 0));
   EXPECT_EQ(only("d 0.25\n").colour, light(1, 1, 1, 0.25));
   EXPECT_EQ(only("Tr 0.25\n").colour, light(1, 1, 1, 0.75));
   EXPECT_EQ(only("Tr 0.25\nd 1\n").colour, light(1, 1, 1, 1));
   EXPECT_EQ(only("d -halo 0.5\nTr 1\n").colour, light(1, 1, 1, 0.5));
   EXPECT_EQ(only("Ns 5\nillum 2\nKs 1 1 1\n").name, "a");
   EXPECT_THAT(warnings_, IsEmpty());
+}
+
+TEST_F(ObjColoursTest, ReadsKdOfBytes) {
+  EXPECT_EQ(only("Kd 51 255 0\nnewmtl b\nKd 0 0 0\nmap_Kd tex.png\n").colour, light(0.2, 1, 0));
+  EXPECT_THAT(warnings_,
+              ElementsAre(HasSubstr("'part.mtl': Kd goes beyond 1; it is read as 0 to 255"),
+                          HasSubstr("are black with a texture")));
+}
+
+TEST_F(ObjColoursTest, RefusesColoursThatAreNoNumbers) {
+  const auto refusal = [&](const std::string& library) {
+    writeLibrary("newmtl a\n" + library);
+    return refused("mtllib part.mtl\n" + triangle + "usemtl a\nf 1 2 3\n");
+  };
+  const std::string three = "Kd needs three numbers from 0 to 1, not ";
+  EXPECT_THAT(refusal("Ns 5\nKd 0,5 0,25 1\n"),
+              HasSubstr("material library 'part.mtl', line 3: " + three +
+                        "'0,5'; repair the line or export again"));
+  EXPECT_THAT(refusal("Kd\n"), HasSubstr("line 2: " + three + "nothing"));
+  EXPECT_THAT(refusal("Kd 1 x\n"), HasSubstr(three + "'x'"));
+  EXPECT_THAT(refusal("Kd nan 0 0\n"), HasSubstr(three + "'nan'"));
+  EXPECT_THAT(refusal("Kd 0 0 -1\n"), HasSubstr(three + "'-1'"));
+  EXPECT_THAT(refusal("d abc\n"), HasSubstr("line 2: d needs one number from 0 to 1, not 'abc'"));
+  EXPECT_THAT(refusal("Tr inf\n"), HasSubstr("Tr needs one number from 0 to 1, not 'inf'"));
+}
+
+TEST_F(ObjColoursTest, FindsFilesInOtherCases) {
+  scratch_.write("Lib.MTL", "newmtl a\nKd 1 0 0\nmap_Kd TEX.PNG\n");
+  const std::string faces = triangle + corners + "usemtl a\nf 1/1 2/2 3/3\n";
+  EXPECT_EQ(read("mtllib lib.mtl\n" + faces).appearance->textures.at(0).width, 4U);
+  EXPECT_EQ(read("mtllib \"LIB.mtl\"\n" + faces).appearance->textures.size(), 1U);
+  scratch_.write("LIB.MTL", "newmtl a\nKd 0 1 0\n");
+  EXPECT_THAT(read("mtllib Lib.MTL\n" + faces).appearance->textures, testing::SizeIs(1));
+  EXPECT_EQ(read("mtllib lib.mtl\n" + faces).appearance->textures.size(), 0U);
 }
 
 TEST_F(ObjColoursTest, GivesEveryTriangleItsMaterial) {
@@ -150,10 +184,11 @@ TEST_F(ObjColoursTest, HonoursTheOptionsOfMaps) {
 }
 
 TEST_F(ObjColoursTest, NamesWhatItDoesNotReadOfALibrary) {
-  only("Kd spectral a.rfl\nmap_Kd -mm 0.1 2 -t 1 tex.png\nmap_d tex.png\n");
+  only("Kd spectral a.rfl\nmap_Kd -mm 0.1 2 -t 1 tex.png\nmap_d tex.png\nmap_Kd\n");
   EXPECT_THAT(warnings_,
-              ElementsAre(HasSubstr("material library 'part.mtl': not read: Kd spectral, map_d, "
-                                    "the option -mm of map_Kd, the option -t of map_Kd")));
+              ElementsAre(HasSubstr("material library 'part.mtl': not read: Kd spectral, map_Kd "
+                                    "without the name of a file, map_d, the option -mm of map_Kd, "
+                                    "the option -t of map_Kd")));
   EXPECT_EQ(only("Kd 0 0 0\nmap_Kd tex.png\n").colour, Vec4f(1));
   EXPECT_THAT(warnings_, ElementsAre(HasSubstr("1 materials, the first 'a', are black with a "
                                                "texture; their textures are read as they are")));

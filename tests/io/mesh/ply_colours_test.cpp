@@ -44,6 +44,7 @@ TEST(PlyColours, ReadsColoursOfVertices) {
   for (const auto& [names, has_opacity] : std::vector<std::pair<std::array<const char*, 4>, bool>>{
            {{"red", "green", "blue", "alpha"}, true},
            {{"r", "g", "b", "a"}, true},
+           {{"Red", "Green", "Blue", "Alpha"}, true},
            {{"diffuse_red", "diffuse_green", "diffuse_blue", ""}, false}}) {
     std::string properties = scalars("uchar", {names[0], names[1], names[2]});
     if (has_opacity) properties += scalars("uchar", {names[3]});
@@ -98,6 +99,33 @@ TEST(PlyColours, ReadsEveryTypeOfNumber) {
   EXPECT_EQ(
       first(binary("big", "double", "\x3F\xF0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x3F\xE0\0\0\0\0\0\0"s)),
       light(1, 0, 0.5));
+}
+
+TEST(PlyColours, TheGreatestValueDecidesWhatIntegersMean) {
+  const auto first = [](const std::string& type, const std::string& colour, Warnings& warnings) {
+    warnings.clear();
+    const Mesh mesh =
+        parseWithColours(ascii + vertexHeader(3, scalars(type, {"red", "green", "blue", "alpha"})) +
+                             faceHeader(1) + "end_header\n0 0 0 " + colour + "\n1 0 0 " + colour +
+                             "\n0 1 0 " + colour + "\n3 0 1 2\n",
+                         &warnings);
+    return mesh.appearance->colours.at(0)[0];
+  };
+  Warnings warnings;
+  for (const char* type : {"short", "ushort"}) {
+    EXPECT_EQ(first(type, "255 0 51 102", warnings), light(1, 0, 0.2, 0.4)) << type;
+    EXPECT_THAT(warnings, ElementsAre("'part': colours of vertices do not go beyond 255; they are "
+                                      "read as 0 to 255"));
+  }
+  for (const char* type : {"int", "uint"}) {
+    EXPECT_EQ(first(type, "65535 0 13107 26214", warnings), light(1, 0, 0.2, 0.4)) << type;
+    EXPECT_THAT(warnings, ElementsAre("'part': colours of vertices go beyond 255; they are read as "
+                                      "0 to 65535"));
+    EXPECT_EQ(first(type, "255 0 51 102", warnings), light(1, 0, 0.2, 0.4)) << type;
+    EXPECT_THAT(warnings, IsEmpty());
+  }
+  EXPECT_EQ(first("ushort", "0 0 0 65535", warnings), light(0, 0, 0));
+  EXPECT_THAT(warnings, IsEmpty());
 }
 
 TEST(PlyColours, TakesRealsBeyondOneAsBytes) {
@@ -156,7 +184,7 @@ class PlyTextures : public testing::Test {
   Warnings warnings_;
 };
 
-const std::string textured = ascii + "comment TextureFile a b.png \ncomment TextureFile c.png\n";
+const std::string textured = ascii + "comment TextureFile a b.png \ncomment texturefile c.png\n";
 const std::string square = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
 
 TEST_F(PlyTextures, ReadsCoordinatesOfCorners) {
@@ -186,13 +214,31 @@ TEST_F(PlyTextures, ReadsCoordinatesOfCorners) {
 
 TEST_F(PlyTextures, ReadsCoordinatesOfVertices) {
   for (const auto& [u, v] : std::vector<std::pair<const char*, const char*>>{
-           {"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}}) {
+           {"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}, {"texcoord_u", "texcoord_v"}}) {
     const Mesh mesh = read(textured + vertexHeader(3, scalars("float", {u, v})) + faceHeader(1) +
                            "end_header\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 .25\n3 2 0 1\n");
     EXPECT_THAT(mesh.appearance->coordinates.at(0),
                 ElementsAre(Vec2f(0, 0.75F), Vec2f(0, 1), Vec2f(1, 1)));
     EXPECT_EQ(mesh.appearance->textures.at(0).height, 2U);
   }
+  EXPECT_THAT(warnings_, IsEmpty());
+}
+
+TEST_F(PlyTextures, CoordinatesAreKeptForATextureThatTheUserGives) {
+  const std::string coloured =
+      vertexHeader(3, scalars("float", {"s", "t"}) + scalars("uchar", {"red", "green", "blue"}));
+  const Mesh of_vertices =
+      read(ascii + coloured + faceHeader(1) +
+           "end_header\n0 0 0 0 0 255 0 0\n1 0 0 1 0 255 0 0\n0 1 0 0 .25 255 0 0\n3 2 0 1\n");
+  EXPECT_THAT(of_vertices.appearance->coordinates.at(0),
+              ElementsAre(Vec2f(0, 0.75F), Vec2f(0, 1), Vec2f(1, 1)));
+  EXPECT_EQ(of_vertices.appearance->colours.at(0)[0], light(1, 0, 0));
+  const Mesh of_corners =
+      read(ascii + vertexHeader(3) + faceHeader(1, "property list uchar float texcoord\n") +
+           "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 6 0 0 1 0 0 1\n");
+  EXPECT_THAT(of_corners.appearance->coordinates.at(0),
+              ElementsAre(Vec2f(0, 1), Vec2f(1, 1), Vec2f(0, 0)));
+  EXPECT_FALSE(of_corners.appearance->hasColours());
   EXPECT_THAT(warnings_, IsEmpty());
 }
 
