@@ -32,6 +32,7 @@ class Merge : public Tool {
     Pipeline pipeline(overwrite_.overwrite ? opened.stepsThatOverwrite() : opened.steps({}));
     const JobPlan& plan = pipeline.plan(watcher);
     opened.checkLattice(plan);
+    checkReads(opened.job());
     std::vector<Piece> pieces;
     for (std::size_t number = 0; number < opened.job().pieces.size(); ++number) {
       const ZRange layers = opened.job().pieces[number].layers;

@@ -49,9 +49,9 @@ class PieceTool : public Tool {
 
   void run() override {
     const OpenJob opened(folder_);
+    checkInputs(opened.job());
     const std::vector<std::size_t> numbers = pieceNumbers(numbers_, opened.job().pieces.size());
     const PiecesFolder pieces(opened.folder() / pieces_name);
-    bool is_checked = false;
     std::size_t kept = 0;
     ToolWatcher watcher(report());
     for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -63,7 +63,6 @@ class PieceTool : public Tool {
         ++kept;
         continue;
       }
-      if (!std::exchange(is_checked, true)) checkInputs(opened.job());
       make(opened, numbers[i], watcher);
       report().print(shown + " is made\n");
     }
@@ -89,6 +88,7 @@ class PieceTool : public Tool {
          "--slab", std::to_string(opened.job().slab_layers)}));
     pipeline.makePiece(output.path());
     opened.checkLattice(pipeline.plan(watcher));
+    checkReads(opened.job());
     pipeline.run();
     writePieceRecord(output.path(), piece);
     output.commit();

@@ -86,7 +86,18 @@ class Plan : public Tool {
     any.pieces.emplace_back();
     for (const auto& [name, text] : jobScripts(any)) names.insert(name);
     std::error_code none;
-    if (fs::is_empty(folder / pieces_name, none)) names.insert(std::string(pieces_name) + "/");
+    const fs::path pieces = folder / pieces_name;
+    if (fs::is_empty(pieces, none)) {
+      names.insert(std::string(pieces_name) + "/");
+    } else if (fs::is_directory(pieces, none)) {
+      throw UsageError("'" + folder.string() + "' holds pieces that took time to make; remove '" +
+                       pieces.string() + "' to plan it again, or name another folder");
+    }
+    // What Slurm writes by the job's script.
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, none)) {
+      const std::string name = entry.path().filename().string();
+      if (name.starts_with("job-") && name.ends_with(".log")) names.insert(name);
+    }
     return names;
   }
 

@@ -171,10 +171,28 @@ std::optional<fs::path> belowData(const fs::path& file) {
   return std::nullopt;
 }
 
-JobInput inputOf(const fs::path& file) {
+/// Without its digest.
+JobInput inputNamed(const fs::path& file) {
   const std::optional<fs::path> data = belowData(file);
   const std::optional<fs::path> here = below(fs::current_path(), file);
-  return {(data ? *data : here ? *here : file).string(), data.has_value(), digestOfFile(file)};
+  return {(data ? *data : here ? *here : file).string(), data.has_value(), {}};
+}
+
+// Behind links.
+fs::path placeOf(const fs::path& path) { return fs::weakly_canonical(fs::absolute(path)); }
+
+bool isAtOrBelow(const fs::path& place, const fs::path& file) {
+  return place == file || below(place, file).has_value();
+}
+
+/// What was read, without masks that are kept for the next run.
+std::vector<fs::path> inputFilesRead() {
+  std::vector<fs::path> files = filesRead();
+  if (const std::optional<fs::path> cache = maskCacheFolder()) {
+    const fs::path masks = placeOf(*cache);
+    std::erase_if(files, [&](const fs::path& file) { return isAtOrBelow(masks, placeOf(file)); });
+  }
+  return files;
 }
 
 }  // namespace
@@ -224,6 +242,7 @@ Job readJob(const fs::path& folder) {
     throw DataError("'" + folder.string() + "' holds no " + job_name +
                     ", so it is not a job made by plan");
   }
+  const ReadsUnnoted of_job;
   constexpr std::uint64_t most_bytes = std::uint64_t{64} << 20;
   const std::string shown = "'" + (folder / job_name).string() + "'";
   const std::vector<std::uint8_t> bytes = readWholeFile(folder / job_name, shown, most_bytes);
@@ -244,30 +263,35 @@ fs::path pieceFolder(const fs::path& job_folder, std::size_t number) {
 }
 
 std::vector<JobInput> inputsRead(const std::vector<std::string>& outputs) {
-  // Behind links.
-  const auto placeOf = [](const fs::path& path) {
-    return fs::weakly_canonical(fs::absolute(path));
-  };
-  const auto isAtOrBelow = [](const fs::path& place, const fs::path& file) {
-    return place == file || below(place, file).has_value();
-  };
-  std::optional<fs::path> masks = maskCacheFolder();
-  if (masks) masks = placeOf(*masks);
   std::vector<fs::path> output_places;
   std::transform(outputs.begin(), outputs.end(), std::back_inserter(output_places), placeOf);
   std::vector<JobInput> inputs;
-  for (const fs::path& file : filesRead()) {
+  for (const fs::path& file : inputFilesRead()) {
     const fs::path place = placeOf(file);
-    if (masks && isAtOrBelow(*masks, place)) continue;
     for (std::size_t i = 0; i < outputs.size(); ++i) {
       if (!isAtOrBelow(output_places[i], place)) continue;
       throw UsageError("the chain reads '" + file.string() + "' and writes '" + outputs[i] +
                        "', so that pieces would read what the merge has written; give the output "
                        "another name");
     }
-    inputs.push_back(inputOf(file));
+    JobInput& input = inputs.emplace_back(inputNamed(file));
+    input.digest = digestOfFile(file);
   }
   return inputs;
+}
+
+void checkReads(const Job& job) {
+  for (const fs::path& file : inputFilesRead()) {
+    const JobInput read = inputNamed(file);
+    const bool is_known =
+        std::any_of(job.inputs.begin(), job.inputs.end(), [&](const JobInput& input) {
+          return input.file == read.file && input.is_data == read.is_data;
+        });
+    if (!is_known)
+      throw DataError("'" + read.file +
+                      "' was not read when the job was planned; take it away, or plan the job "
+                      "again");
+  }
 }
 
 void checkInputs(const Job& job) {

@@ -9,6 +9,7 @@
 
 #include "io/file/file_digest.h"
 #include "io/file/file_name.h"
+#include "io/file/files_read.h"
 #include "io/file/staged_output.h"
 #include "io/file/text_bytes.h"
 #include "io/file/whole_file.h"
@@ -57,6 +58,7 @@ struct Record {
 std::optional<Record> readRecord(const fs::path& folder, std::string& problem) {
   constexpr std::uint64_t most_bytes = std::uint64_t{256} << 20;
   const fs::path path = folder / record_name;
+  const ReadsUnnoted of_piece;
   const std::vector<std::uint8_t> bytes =
       readWholeFile(path, "'" + path.string() + "'", most_bytes);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());

@@ -170,7 +170,26 @@ class Jobs(ProgramTest):
         self.plan(chain, "--pieces", "2", "--overwrite")
         self.assertFalse((self.folder / "job/pieces").exists())
         self.succeed("piece", "job", "0")
-        self.refuse(2, "'job' holds 'pieces', which was not written with the rest", "plan", chain, "--overwrite")
+        self.refuse(2, "'job' holds pieces that took time to make; remove 'job/pieces' to plan it again", "plan", chain, "--overwrite")
+        shutil.rmtree(self.folder / "job/pieces")
+        (self.folder / "job/job-12-0.log").write_text("said\n")
+        self.plan(chain, "--pieces", "2", "--overwrite")
+        self.assertFalse((self.folder / "job/job-12-0.log").exists())
+
+    def test_a_file_that_was_missing_in_the_plan_is_not_read_later(self):
+        vertices = "".join(f"v {x} {y} {z}\n" for z in (0, 2) for y in (0, 2) for x in (0, 2))
+        faces = "".join(f"f {face}\n" for face in ("1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"))
+        (self.folder / "cube.obj").write_text(f"mtllib cube.mtl\n{vertices}usemtl red\n{faces}")
+        chain = "mesh2sdf cube.obj --pitch 0.1mm --colour ! write out.vdb"
+        self.assertEqual(self.run_program("plan", chain, "job", "--pieces", "2").returncode, 0)
+        self.assertEqual(self.run_program("piece", "job", "0").returncode, 0)
+        (self.folder / "cube.mtl").write_text("newmtl red\nKd 1 0 0\n")
+        said = "'cube.mtl' was not read when the job was planned; take it away, or plan the job again"
+        self.refuse(1, said, "piece", "job", "1")
+        (self.folder / "cube.mtl").unlink()
+        self.assertEqual(self.run_program("piece", "job", "1").returncode, 0)
+        (self.folder / "cube.mtl").write_text("newmtl red\nKd 1 0 0\n")
+        self.refuse(1, said, "merge", "job")
 
     def test_two_runs_may_make_the_same_piece_at_once(self):
         self.plan(f"{DITHER} ! slice-export out")
@@ -187,6 +206,7 @@ class Jobs(ProgramTest):
         whole = (self.folder / "part.stl").read_bytes()
         (self.folder / "part.stl").write_bytes(whole[:-1] + b"\1")
         self.refuse(1, "'part.stl' is not the file that the job was planned with", "merge", "job")
+        self.refuse(1, "'part.stl' is not the file that the job was planned with", "piece", "job", "0")
         shutil.rmtree(self.folder / "job/pieces/0001")
         self.refuse(1, "'part.stl' is not the file that the job was planned with", "piece", "job", "0-3")
         (self.folder / "part.stl").write_bytes(whole)
