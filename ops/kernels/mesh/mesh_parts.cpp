@@ -1,7 +1,9 @@
 #include "ops/kernels/mesh/mesh_parts.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <set>
 #include <string>
 #include <utility>
@@ -9,6 +11,33 @@
 #include "ops/kernels/mesh/mesh_edges.h"
 
 namespace vdbdither {
+
+namespace {
+
+/// Whether an opposite side meets every side. Files have a vertex several times where its normal or
+/// its place on a texture changes.
+bool isClosed(const Mesh& part) {
+  const auto& vertices = part.vertices;
+  std::vector<std::uint32_t> order(vertices.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return vertices[a] < vertices[b]; });
+  std::vector<std::uint32_t> first(vertices.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const bool is_same = i > 0 && vertices[order[i]] == vertices[order[i - 1]];
+    first[order[i]] = is_same ? first[order[i - 1]] : order[i];
+  }
+  Mesh welded;
+  welded.vertices = vertices;
+  for (const Mesh::Triangle& triangle : part.triangles) {
+    const Mesh::Triangle corners{first[triangle[0]], first[triangle[1]], first[triangle[2]]};
+    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
+    welded.triangles.push_back(corners);
+  }
+  return isBalanced(welded);
+}
+
+}  // namespace
 
 std::vector<Mesh> partsOf(Mesh mesh) {
   std::set<std::string> names;
@@ -31,7 +60,7 @@ std::vector<Mesh> partsOf(Mesh mesh) {
         corner = renamed[corner];
       }
     }
-    if (names.size() <= i || !isBalanced(part)) {
+    if (names.size() <= i || !isClosed(part)) {
       parts.clear();
       break;
     }

@@ -1,5 +1,6 @@
 #include "ops/kernels/mesh/mesh_parts.h"
 
+#include <cstdint>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -35,6 +36,33 @@ TEST(MeshParts, ClosedPartsAreMeshesOfTheirOwn) {
   for (std::size_t corner = 0; corner < 3; ++corner)
     EXPECT_EQ(parts[1].vertices[parts[1].triangles[4][corner]],
               right.vertices[right.triangles[4][corner]]);
+}
+
+/// Three vertices for every triangle, as files have them that state normals or places on textures.
+Mesh split(const Mesh& mesh) {
+  Mesh result;
+  for (const Mesh::Triangle& triangle : mesh.triangles) {
+    const auto first = static_cast<std::uint32_t>(result.vertices.size());
+    for (const std::uint32_t corner : triangle) result.vertices.push_back(mesh.vertices[corner]);
+    result.triangles.push_back({first, first + 1, first + 2});
+  }
+  result.parts = mesh.parts;
+  return result;
+}
+
+TEST(MeshParts, AreClosedWhereTheirVerticesStandSeveralTimes) {
+  Mesh mesh = split(named({{"left", 0}, {"right", 12}}));
+  // Zeros of both signs are one place, and a triangle without an area is no side.
+  for (std::size_t i = 0; i < mesh.vertices.size(); i += 2) {
+    if (mesh.vertices[i].x() == 0) mesh.vertices[i].x() = -0.0;
+  }
+  mesh.vertices.push_back(right.vertices[0]);
+  mesh.triangles.push_back({36, 36, static_cast<std::uint32_t>(mesh.vertices.size() - 1)});
+  const std::vector<Mesh> parts = partsOf(mesh);
+  ASSERT_THAT(parts, SizeIs(2));
+  EXPECT_THAT(parts[0].vertices, SizeIs(36));
+  EXPECT_THAT(parts[1].triangles, SizeIs(13));
+  EXPECT_THAT(partsOf(split(named({{"left", 0}, {"right", 11}}))), SizeIs(1));
 }
 
 TEST(MeshParts, PatchesAndRepeatedNamesAreOneMesh) {
