@@ -102,6 +102,16 @@ class TiffSamples {
   std::vector<std::uint8_t> row_;
 };
 
+/// Whether each strip or tile has bytes. Where they are missing, libtiff converts zeros: a file of
+/// a few bytes would become an image of any size.
+bool hasAllBlocks(TIFF* tiff) {
+  const std::uint32_t count =
+      TIFFIsTiled(tiff) ? TIFFNumberOfTiles(tiff) : TIFFNumberOfStrips(tiff);
+  for (std::uint32_t block = 0; block < count; ++block)
+    if (TIFFGetStrileByteCount(tiff, block) == 0) return false;
+  return true;
+}
+
 /// Other kinds of pixels, as libtiff converts them: palettes, few bits, YCbCr, CMYK, Lab.
 Texture readConverted(TIFF* tiff, const TiffHead& head, TextureOpacity opacity) {
   constexpr std::uint64_t most_converted = std::uint64_t{1} << 26;
@@ -110,6 +120,7 @@ Texture readConverted(TIFF* tiff, const TiffHead& head, TextureOpacity opacity) 
   std::array<char, 1024> why{};
   if (TIFFRGBAImageOK(tiff, why.data()) == 0)
     throw DataError("is a TIFF of a kind that is not read; save it as RGB of 8 or 16 bits");
+  if (!hasAllBlocks(tiff)) throw DataError(damaged_tiff);
   std::vector<std::uint32_t> raster(std::size_t{head.width} * head.height);
   if (TIFFReadRGBAImageOriented(tiff, head.width, head.height, raster.data(), head.orientation,
                                 1) != 1)

@@ -302,6 +302,21 @@ TEST(TextureTiff, HonoursProfiles) {
             decoded(tiffOf(samples, {})).texels);
 }
 
+TEST(TextureTiff, RefusesMoreRowsThanItsBytesHold) {
+  TiffKind kind{.meaning = PHOTOMETRIC_PALETTE, .rows = 5};
+  kind.palette.resize(768);
+  Bytes bytes = tiffOf(pattern(9, 5, 1), kind);
+  EXPECT_EQ(decoded(bytes).height, 5U);
+  // ImageLength, as a long.
+  const Bytes tag{0x01, 0x01, 0x03, 0, 1, 0, 0, 0, 5, 0};
+  const auto at = std::search(bytes.begin(), bytes.end(), tag.begin(), tag.end());
+  ASSERT_NE(at, bytes.end());
+  const Bytes longer{0x01, 0x01, 0x04, 0, 1, 0, 0, 0, 0, 0, 16, 0};
+  std::copy(longer.begin(), longer.end(), at);
+  EXPECT_EQ(test::textureRefusal(bytes),
+            "texture 'a' is not a readable TIFF: it is damaged or cut short; save it again");
+}
+
 TEST(TextureTiff, RefusesWhatIsDamagedOrOfOtherKinds) {
   const Samples samples = pattern(19, 11, 3);
   for (const std::uint32_t tile : {0, 16}) {
