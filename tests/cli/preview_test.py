@@ -15,7 +15,16 @@ from program import MIMAKI, ProgramTest
 try:
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
+    from selenium.webdriver.common import utils
     from selenium.webdriver.common.keys import Keys
+
+    class Driver(Service):
+        """Is reached also where the name "localhost" has no address, as in a container without /etc/hosts."""
+
+        service_url = property(lambda self: f"http://127.0.0.1:{self.port}")
+
+        def is_connectable(self):
+            return utils.is_connectable(self.port, "127.0.0.1")
 except ImportError:
     webdriver = None
 
@@ -87,11 +96,11 @@ class Browser(Pages):
     def setUpClass(cls):
         options = webdriver.ChromeOptions()
         options.binary_location = shutil.which("chromium")
-        for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader",
+        for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader", "--remote-debugging-pipe",
                          "--window-size=1200,800", f"--user-data-dir={cls.folder_of_class()}"):
             options.add_argument(argument)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-        cls.browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+        cls.browser = webdriver.Chrome(service=Driver(shutil.which("chromedriver")), options=options)
         cls.addClassCleanup(cls.browser.quit)
 
     def open(self, name):
