@@ -413,6 +413,10 @@ class ProgressLines(ProgramTest):
         self.assertEqual(shares, sorted(shares))
         self.assertEqual((shares[-1], lines[-1]["layers"]["done"]), (1, lines[-1]["layers"]["all"]))
         self.assertEqual(set(lines[-1]), {"stage", "share", "seconds", "seconds_left", "layers"})
+        self.succeed("plan", "mesh2sdf part.stl --pitch 1mm ! dither ! slice-export small", "job", "--pieces", "1")
+        self.succeed("piece", "job", "0")
+        done = self.run_program("piece", "job", "0", "--progress", "json")
+        self.assertEqual(json.loads(done.stderr)["stage"], "piece")
         self.assertEqual(lines[-1]["seconds_left"], 0)
 
     def test_a_run_tells_each_second_how_far_it_is(self):
@@ -425,6 +429,7 @@ class ProgressLines(ProgramTest):
             pipe.flush()
             # The run waits for the rest, and goes on telling.
             lines = [json.loads(run.stderr.readline()) for _ in range(2)]
+            self.assertNotIn("", [line["stage"] for line in lines])
             pipe.write(surface[-1000:])
         self.assertLess(max(line["share"] for line in lines), 1)
         self.assertGreater(lines[1]["seconds"], lines[0]["seconds"])

@@ -6,6 +6,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "vdbdither/engine/monitor.h"
 #include "vdbdither/engine/run_options.h"
@@ -17,7 +18,8 @@ namespace vdbdither {
 /// (docs/jobs.md), one each second. Otherwise it only passes warnings and results on.
 class Console : public Watcher {
  public:
-  explicit Console(Progress style = Progress::bar) : style_(style) {}
+  /// @param verb  what works until another says so
+  Console(Progress style, std::string verb) : style_(style), state_{.verb = std::move(verb)} {}
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
   ~Console() override;

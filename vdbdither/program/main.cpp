@@ -123,7 +123,7 @@ void runTool(ToolRun&& tool) {
   if (tool.options().no_flush) StagedOutput::leaveFlushOut();
   const GrantedThreads threads;
   const Clock::time_point start = Clock::now();
-  Console console(tool.options().progress);
+  Console console(tool.options().progress, tool.report().stages.front().name);
   console.begin(tool.options().quiet || tool.options().verbose, 0, 0);
   runReported(tool, console, start, [&] { tool.run(console); });
 }
@@ -137,7 +137,7 @@ void runChain(const std::vector<Step>& steps) {
   if (options.no_flush) StagedOutput::leaveFlushOut();
   const GrantedThreads threads;
   const Clock::time_point start = Clock::now();
-  Console console(options.progress);
+  Console console(options.progress, steps.front().verb);
   console.begin(options.quiet, 0, 0);
   if (options.explain) StagedOutput::acceptExisting();
   const JobPlan& plan = pipeline.plan(console);
