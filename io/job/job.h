@@ -73,8 +73,8 @@ std::vector<JobInput> inputsRead(const std::vector<std::string>& outputs);
 /// Throws DataError unless each input is the file it was.
 void checkInputs(const Job& job);
 
-/// Throws DataError if the program has read a file that is no input of the job, such as one that
-/// was not there when it was planned.
+/// Throws DataError if the program has read a file that the job does not list as an input, for
+/// example a file that did not exist when the job was planned.
 void checkReads(const Job& job);
 
 }  // namespace vdbdither

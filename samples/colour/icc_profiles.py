@@ -36,9 +36,7 @@ def colours():
 
 
 def lab_d50(rgb):
-    ratio = rgb @ XYZ_D50_OF_RGB.T / WHITE_D50
-    root = np.where(ratio > (6 / 29) ** 3, np.cbrt(ratio), ratio * (29 / 6) ** 2 / 3 + 4 / 29)
-    return np.stack([116 * root[:, 1] - 16, 500 * (root[:, 0] - root[:, 1]), 200 * (root[:, 1] - root[:, 2])], axis=1)
+    return optics.lab_of_xyz(rgb @ XYZ_D50_OF_RGB.T, WHITE_D50)
 
 
 def separated(program, folder, profile, rgb):

@@ -31,6 +31,11 @@ CHANGES = (1, 2, 3, 4)
 UP = (0, 0, 1)
 
 
+def depths(voxels):
+    """Returns how many printed voxels lie above each one, int [z, y, x]."""
+    return np.cumsum(voxels[::-1] > 0, axis=0)[::-1] - 1
+
+
 def layered(voxels, depth_mm, pitch_mm, colours, tile):
     """Returns voxels, uint8 [z, y, x], with the layered layout down to `depth_mm` from the top of every column.
 
@@ -45,14 +50,14 @@ def layered(voxels, depth_mm, pitch_mm, colours, tile):
     _, rows, columns = voxels.shape
     end = ranks[np.arange(rows)[:, None] % layer.shape[0], np.arange(columns)[None] % layer.shape[1]]
     count = round(depth_mm / pitch_mm[2])
-    below = np.cumsum(voxels[::-1] > 0, axis=0)[::-1] - 1
+    below = depths(voxels)
     chosen = 1 + order[np.searchsorted(limits, (below + end) / count, side="right").clip(0, len(order) - 1)]
     return np.where((voxels > 0) & (below < count), chosen, voxels).astype(np.uint8)
 
 
 def seen(voxels, pitch_mm, colours):
     """Returns the linear colours [lengths, 3] that a plate shows if light reaches each of LENGTHS_MM deep."""
-    below = np.cumsum(voxels[::-1] > 0, axis=0)[::-1] - 1
+    below = depths(voxels)
     printed = voxels > 0
     count = int(below.max()) + 1
     table = np.bincount(below[printed] * (len(colours) + 1) + voxels[printed], minlength=count * (len(colours) + 1))

@@ -48,8 +48,8 @@ def lab(rgb):
     return lab_of_xyz(np.asarray(rgb, float) @ XYZ_OF_RGB.T)
 
 
-def lab_of_xyz(xyz):
-    x, y, z = np.moveaxis(_compressed(xyz / WHITE), -1, 0)
+def lab_of_xyz(xyz, white=WHITE):
+    x, y, z = np.moveaxis(_compressed(xyz / white), -1, 0)
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
 
 

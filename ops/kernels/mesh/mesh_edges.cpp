@@ -1,6 +1,8 @@
 #include "ops/kernels/mesh/mesh_edges.h"
 
 #include <algorithm>
+#include <numeric>
+#include <tuple>
 #include <utility>
 
 namespace vdbdither {
@@ -65,6 +67,22 @@ bool isBalanced(const Mesh& mesh) {
   for (std::uint32_t e = 0; e < edges.size(); ++e)
     if (edges.surplus(mesh, e) != 0) return false;
   return true;
+}
+
+std::vector<std::uint32_t> firstAtPlace(const Mesh& mesh) {
+  std::vector<std::uint32_t> order(mesh.vertices.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto key = [&](std::uint32_t v) {
+    const openvdb::Vec3d p = mesh.vertices[v] + openvdb::Vec3d(0, 0, 0);  // −0 becomes +0
+    return std::tuple(p.x(), p.y(), p.z());
+  };
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(key(a), a) < std::pair(key(b), b);
+  });
+  std::vector<std::uint32_t> first(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+    first[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? first[order[i - 1]] : order[i];
+  return first;
 }
 
 }  // namespace vdbdither

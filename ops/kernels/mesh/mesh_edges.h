@@ -43,4 +43,12 @@ class MeshEdges {
 /// Whether an opposite side meets every side of the triangles.
 bool isBalanced(const Mesh& mesh);
 
+/// Returns, for each vertex, the first one at the same place. Zeros of both signs are equal.
+std::vector<std::uint32_t> firstAtPlace(const Mesh& mesh);
+
+/// Whether two corners are one vertex.
+inline bool isDegenerate(const Mesh::Triangle& t) {
+  return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+}
+
 }  // namespace vdbdither

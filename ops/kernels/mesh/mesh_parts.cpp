@@ -1,9 +1,7 @@
 #include "ops/kernels/mesh/mesh_parts.h"
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
 #include <set>
 #include <string>
 #include <utility>
@@ -17,22 +15,12 @@ namespace {
 /// Whether an opposite side meets every side. Files have a vertex several times where its normal or
 /// its place on a texture changes.
 bool isClosed(const Mesh& part) {
-  const auto& vertices = part.vertices;
-  std::vector<std::uint32_t> order(vertices.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::sort(order.begin(), order.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return vertices[a] < vertices[b]; });
-  std::vector<std::uint32_t> first(vertices.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool is_same = i > 0 && vertices[order[i]] == vertices[order[i - 1]];
-    first[order[i]] = is_same ? first[order[i - 1]] : order[i];
-  }
+  const std::vector<std::uint32_t> first = firstAtPlace(part);
   Mesh welded;
-  welded.vertices = vertices;
-  for (const Mesh::Triangle& triangle : part.triangles) {
-    const Mesh::Triangle corners{first[triangle[0]], first[triangle[1]], first[triangle[2]]};
-    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
-    welded.triangles.push_back(corners);
+  welded.vertices = part.vertices;
+  for (const Mesh::Triangle& t : part.triangles) {
+    const Mesh::Triangle corners{first[t[0]], first[t[1]], first[t[2]]};
+    if (!isDegenerate(corners)) welded.triangles.push_back(corners);
   }
   return isBalanced(welded);
 }

@@ -10,7 +10,6 @@
 #include <map>
 #include <memory>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
 #include "ops/kernels/mesh/box_tree.h"
@@ -37,28 +36,12 @@ void renumber(DerivedMesh& made, const std::vector<std::uint32_t>& to, MeshRepai
   for (Triangle& t : triangles)
     for (std::uint32_t& v : t) v = to[v];
   const std::size_t before = triangles.size();
-  dropTriangles(made, [&triangles](std::uint32_t i) {
-    const Triangle& t = triangles[i];
-    return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
-  });
+  dropTriangles(made, [&triangles](std::uint32_t i) { return isDegenerate(triangles[i]); });
   repairs.degenerate_triangles += before - triangles.size();
 }
 
 void weldEqual(DerivedMesh& made, MeshRepairs& repairs) {
-  const Mesh& mesh = made.mesh;
-  std::vector<std::uint32_t> order(mesh.vertices.size());
-  std::iota(order.begin(), order.end(), 0U);
-  const auto key = [&](std::uint32_t v) {
-    const Vec3d p = mesh.vertices[v] + Vec3d(0, 0, 0);  // −0 becomes +0
-    return std::tuple(p.x(), p.y(), p.z());
-  };
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return std::pair(key(a), a) < std::pair(key(b), b);
-  });
-  std::vector<std::uint32_t> to(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i)
-    to[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? to[order[i - 1]] : order[i];
-  renumber(made, to, repairs);
+  renumber(made, firstAtPlace(made.mesh), repairs);
 }
 
 /// A directed side that opposite sides do not cancel, and its surplus.

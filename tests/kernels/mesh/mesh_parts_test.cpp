@@ -13,6 +13,7 @@ namespace vdbdither {
 namespace {
 
 using test::boxMesh;
+using test::unshared;
 using testing::SizeIs;
 
 const Mesh left = boxMesh({0, 0, 0}, {1, 1, 1});
@@ -38,14 +39,9 @@ TEST(MeshParts, ClosedPartsAreMeshesOfTheirOwn) {
               right.vertices[right.triangles[4][corner]]);
 }
 
-/// Three vertices for every triangle, as files have them that state normals or places on textures.
+/// As files have meshes that state normals or places on textures.
 Mesh split(const Mesh& mesh) {
-  Mesh result;
-  for (const Mesh::Triangle& triangle : mesh.triangles) {
-    const auto first = static_cast<std::uint32_t>(result.vertices.size());
-    for (const std::uint32_t corner : triangle) result.vertices.push_back(mesh.vertices[corner]);
-    result.triangles.push_back({first, first + 1, first + 2});
-  }
+  Mesh result = unshared(mesh);
   result.parts = mesh.parts;
   return result;
 }
